@@ -1,0 +1,1 @@
+//! Fixed-seed inputs shared by the benchmarks.

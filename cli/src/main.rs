@@ -1,0 +1,3 @@
+//! The `mba` program.
+
+fn main() {}

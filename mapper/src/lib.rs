@@ -1,0 +1,1 @@
+//! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.

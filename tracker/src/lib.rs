@@ -22,3 +22,4 @@ extern crate std;
 pub mod geometry;
 pub mod math;
 pub mod trajectory;
+pub mod transfer;

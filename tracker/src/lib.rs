@@ -19,7 +19,13 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod error;
 pub mod geometry;
+pub mod image;
+pub mod keyframe;
 pub mod math;
+pub mod photometric;
+pub mod surface;
 pub mod trajectory;
 pub mod transfer;
+pub mod workspace;

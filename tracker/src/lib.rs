@@ -19,6 +19,7 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod align;
 pub mod error;
 pub mod geometry;
 pub mod image;
@@ -26,6 +27,9 @@ pub mod keyframe;
 pub mod math;
 pub mod photometric;
 pub mod surface;
+mod tracker;
 pub mod trajectory;
 pub mod transfer;
 pub mod workspace;
+
+pub use tracker::{Frame, FrameResult, FrameStatus, ReferenceMode, Tracker, TrackerConfig, workspace_len};

@@ -21,5 +21,6 @@ extern crate std;
 
 pub mod geometry;
 pub mod math;
+pub mod simd;
 pub mod trajectory;
 pub mod transfer;

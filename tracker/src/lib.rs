@@ -19,8 +19,14 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod error;
 pub mod geometry;
+pub mod image;
+pub mod keyframe;
 pub mod math;
+pub mod photometric;
 pub mod simd;
+pub mod surface;
 pub mod trajectory;
 pub mod transfer;
+pub mod workspace;

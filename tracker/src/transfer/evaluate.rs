@@ -1,5 +1,6 @@
 //! The photometric term of one pyramid level: robust cost and normal equations over all patches.
 
+use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{SMatrix, SVector};
 
@@ -19,7 +20,8 @@ pub struct ResidualModel {
 }
 
 /// Outcome of one patch.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct PatchCost {
     /// Sum of the robust cost over the valid pixels, in squared standard deviations.
     pub cost: f32,

@@ -1,5 +1,7 @@
 //! The data that a transfer kernel reads and writes.
 
+use bytemuck::{Pod, Zeroable};
+
 use super::pattern::PATCH_PIXELS;
 use super::virtual_view::VirtualView;
 
@@ -20,7 +22,8 @@ pub struct LevelImage<'a> {
 }
 
 /// A keypoint as it is observed in the current frame; frozen while one linearisation is tried out.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
 pub struct PatchSite {
     /// Column of the patch centre in the current image.
     pub u: i16,

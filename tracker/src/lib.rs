@@ -26,6 +26,7 @@ pub mod image;
 pub mod keyframe;
 pub mod math;
 pub mod photometric;
+pub mod simd;
 pub mod surface;
 mod tracker;
 pub mod trajectory;

@@ -178,7 +178,7 @@ impl<'m> Tracker<'m> {
                 let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
                 estimate.keyframe_from_camera =
                     ExposureTrajectory::from_mid_and_motion(&mid, &prior.expected);
-                let result = align_level(&alignment, level, estimate, &prior, 2, &mut self.scratch);
+                let result = align_level(&alignment, level, estimate, &prior, 4, &mut self.scratch);
                 iterations += result.iterations;
                 estimate = result.estimate;
                 outcome = Some(result);
@@ -201,7 +201,7 @@ impl<'m> Tracker<'m> {
                 level,
                 estimate,
                 &prior,
-                if level == 0 { 1 } else { 2 },
+                2,
                 &mut self.scratch,
             );
             iterations += outcome.iterations;

@@ -19,7 +19,17 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod align;
+pub mod error;
 pub mod geometry;
 pub mod image;
+pub mod keyframe;
 pub mod math;
+pub mod photometric;
+pub mod surface;
+mod tracker;
 pub mod trajectory;
+pub mod transfer;
+pub mod workspace;
+
+pub use tracker::{Frame, FrameResult, FrameStatus, ReferenceMode, Tracker, TrackerConfig, workspace_len};

@@ -39,11 +39,9 @@ impl fmt::Display for FrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Buffer { needed, got } => write!(f, "image buffer holds {got} values, {needed} are needed"),
-            Self::Size { expected, got } => write!(
-                f,
-                "image is {}x{}, the calibration says {}x{}",
-                got.0, got.1, expected.0, expected.1
-            ),
+            Self::Size { expected, got } => {
+                write!(f, "image is {}x{}, the calibration says {}x{}", got.0, got.1, expected.0, expected.1)
+            }
             Self::Timestamp { previous, got } => {
                 write!(f, "timestamp {got:.6} s does not follow {previous:.6} s")
             }

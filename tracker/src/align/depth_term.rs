@@ -180,5 +180,5 @@ impl RowSums {
 /// another surface would be.
 #[must_use]
 pub fn gate_for(sigma: f32) -> f32 {
-    (6.0 * sigma).clamp(0.002, 2.0 * spread_limit(0.3))
+    (6.0 * sigma).clamp(0.012, 2.0 * spread_limit(0.3))
 }

@@ -1,5 +1,6 @@
 //! Levenberg-Marquardt on one pyramid level.
 
+use fearless_simd::Level;
 use nalgebra::{SMatrix, SVector, Vector6};
 
 use super::depth_term::{DepthProblem, gate_for};
@@ -11,7 +12,7 @@ use super::{AlignSettings, Estimate, UNKNOWNS};
 use crate::geometry::PinholeCamera;
 use crate::math::sqrt_f32;
 use crate::trajectory::SampleRule;
-use crate::transfer::{self, PatchCost, ResidualModel, virtual_views};
+use crate::transfer::{self, BrightnessModel, PatchCost, ResidualModel, virtual_views};
 
 /// Why iterations on a level ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,20 +63,34 @@ const MIN_DEPTH_POINTS: usize = 60;
 /// Nominal variance per unit of light; the measured scale multiplies it.
 const NOMINAL_PHOTON_VARIANCE: f32 = 1e-4;
 
-/// Aligns `frame` with `reference` on pyramid level `level`, starting from `initial`.
-#[allow(clippy::too_many_arguments, reason = "one call per level; a struct would only rename the list")]
+/// What all levels of one alignment share.
+#[derive(Clone, Copy, Debug)]
+pub struct Alignment<'a> {
+    /// Instruction set of the kernels.
+    pub simd: Level,
+    /// Intrinsics of the full-resolution images.
+    pub camera: PinholeCamera,
+    /// What the frame is aligned with.
+    pub reference: ReferenceData<'a>,
+    /// The frame.
+    pub frame: FrameData<'a>,
+    /// Expected gain and offset.
+    pub expected_brightness: BrightnessModel,
+    /// Settings.
+    pub settings: &'a AlignSettings,
+}
+
+/// Aligns a frame on pyramid level `level`, starting from `initial`; the depth term takes every `depth_stride`-th
+/// row and column.
 pub fn align_level(
+    alignment: &Alignment,
     level: usize,
-    camera: &PinholeCamera,
-    reference: ReferenceData,
-    frame: FrameData,
     initial: Estimate,
     prior: &MotionPrior,
-    brightness_mean: (f64, f64),
     depth_stride: usize,
-    settings: &AlignSettings,
     scratch: &mut AlignScratch,
 ) -> LevelOutcome {
+    let Alignment { camera, reference, frame, settings, .. } = *alignment;
     let level_camera = camera.at_level(level);
     let mut outcome = LevelOutcome {
         estimate: initial,
@@ -108,6 +123,7 @@ pub fn align_level(
         let mut objective = Objective {
             camera: level_camera,
             level,
+            simd: alignment.simd,
             reference,
             frame,
             sites: &[],
@@ -116,12 +132,12 @@ pub fn align_level(
             photometric_weight: 0.0,
             depth: None,
             prior: *prior,
-            brightness_mean,
+            expected_brightness: alignment.expected_brightness,
             settings,
         };
         let kept = measure_photometric(&mut objective, &estimate, in_view, scratch);
         if settings.depth_term {
-            measure_depth(&mut objective, camera, &estimate, depth_stride, scratch.medians);
+            measure_depth(&mut objective, &camera, &estimate, depth_stride, scratch.medians);
         }
         objective.sites = &scratch.sites[..kept];
         outcome.views = views;
@@ -222,6 +238,7 @@ fn measure_photometric(
     let square_model = ResidualModel { huber: f32::MAX, ..objective.model };
     let problem = objective.transfer_problem(estimate, &views);
     transfer::evaluate_cost(
+        objective.simd,
         &problem,
         &scratch.sites[..in_view],
         &square_model,
@@ -274,7 +291,8 @@ fn measure_depth<'a>(
     let sigma = sigma.max(objective.settings.min_depth_sigma);
     problem.stride = stride;
     problem.gate = gate_for(sigma);
-    let weight = (stride * stride) as f64 / objective.settings.depth_correlation.max((stride * stride) as f64);
+    let weight =
+        (stride * stride) as f64 / objective.settings.depth_correlation.max((stride * stride) as f64);
     objective.depth = Some((problem, sigma, weight));
 }
 
@@ -290,19 +308,14 @@ fn damped_step(at: &Linearised, damping: f64) -> Option<SVector<f64, UNKNOWNS>> 
 }
 
 /// Largest image motion in pixels that a step causes at the scene's typical depth.
-fn step_in_pixels(
-    step: &SVector<f64, UNKNOWNS>,
-    camera: &PinholeCamera,
-    inverse_depth: f64,
-) -> f64 {
+fn step_in_pixels(step: &SVector<f64, UNKNOWNS>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
     let centre = pixels_of(&step.fixed_rows::<6>(0).into_owned(), camera, inverse_depth);
     let motion = pixels_of(&step.fixed_rows::<6>(6).into_owned(), camera, inverse_depth);
     centre.max(0.5 * motion)
 }
 
 fn pixels_of(tangent: &Vector6<f64>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
-    camera.fx
-        * (tangent.fixed_rows::<3>(0).norm() * inverse_depth).max(tangent.fixed_rows::<3>(3).norm())
+    camera.fx * (tangent.fixed_rows::<3>(0).norm() * inverse_depth).max(tangent.fixed_rows::<3>(3).norm())
 }
 
 fn median_inverse_depth(keypoints: &[crate::keyframe::Keypoint]) -> f64 {

@@ -16,7 +16,7 @@ mod prior;
 mod scale;
 mod settings;
 
-pub use level::{LevelOutcome, StopReason, align_level};
+pub use level::{Alignment, LevelOutcome, StopReason, align_level};
 pub use objective::{AlignScratch, FrameData, Linearised, ReferenceData};
 pub use placement::{blur_length, place_sites};
 pub use prior::MotionPrior;

@@ -1,5 +1,6 @@
 //! The combined objective and its normal equations in (centre, exposure motion) coordinates.
 
+use fearless_simd::Level;
 use nalgebra::{Matrix3, SMatrix, SVector};
 
 use super::depth_term::DepthProblem;
@@ -11,7 +12,8 @@ use crate::keyframe::Keypoint;
 use crate::surface::{InverseDepthMap, SurfacePlanes};
 use crate::trajectory::{ExposureTrajectory, SampleRule};
 use crate::transfer::{
-    self, PatchCost, PatchSite, PhotometricSums, ResidualModel, TransferProblem, virtual_views,
+    self, BrightnessModel, PatchCost, PatchSite, PhotometricSums, ResidualModel, TransferProblem,
+    virtual_views,
 };
 
 /// The sharp reference that a frame is aligned with.
@@ -49,6 +51,7 @@ pub struct AlignScratch<'m> {
 
 /// Everything that stays fixed while steps on one level are tried out.
 pub(super) struct Objective<'a> {
+    pub simd: Level,
     pub camera: PinholeCamera,
     pub level: usize,
     pub reference: ReferenceData<'a>,
@@ -59,7 +62,7 @@ pub(super) struct Objective<'a> {
     pub photometric_weight: f64,
     pub depth: Option<(DepthProblem<'a>, f32, f64)>,
     pub prior: MotionPrior,
-    pub brightness_mean: (f64, f64),
+    pub expected_brightness: BrightnessModel,
     pub settings: &'a AlignSettings,
 }
 
@@ -83,7 +86,7 @@ pub struct Linearised {
 impl Objective<'_> {
     /// Evaluates the objective. `expected_counts` are the pixels and depth points of the linearisation that this
     /// cost is compared with: costs are scaled to them, so that losing data never looks like an improvement.
-    pub fn linearise(
+    pub(super) fn linearise(
         &self,
         estimate: &Estimate,
         expected_counts: Option<(f64, f64)>,
@@ -127,17 +130,13 @@ impl Objective<'_> {
     }
 
     fn photometric(&self, estimate: &Estimate, costs: &mut [PatchCost]) -> PhotometricSums {
-        let views = virtual_views(
-            &estimate.keyframe_from_camera,
-            self.views,
-            SampleRule::Midpoint,
-            &self.camera,
-        );
+        let views =
+            virtual_views(&estimate.keyframe_from_camera, self.views, SampleRule::Midpoint, &self.camera);
         let problem = self.transfer_problem(estimate, &views);
-        transfer::linearize(&problem, self.sites, &self.model, costs)
+        transfer::linearize(self.simd, &problem, self.sites, &self.model, costs)
     }
 
-    pub fn transfer_problem<'b>(
+    pub(super) fn transfer_problem<'b>(
         &'b self,
         estimate: &Estimate,
         views: &'b [transfer::VirtualView],
@@ -160,8 +159,11 @@ impl Objective<'_> {
             result.gradient[6 + i] += self.prior.information[i] * residual[i];
         }
         let brightness = [
-            (f64::from(estimate.brightness.gain) - self.brightness_mean.0, self.settings.gain_sigma),
-            (f64::from(estimate.brightness.offset) - self.brightness_mean.1, self.settings.offset_sigma),
+            (f64::from(estimate.brightness.gain - self.expected_brightness.gain), self.settings.gain_sigma),
+            (
+                f64::from(estimate.brightness.offset - self.expected_brightness.offset),
+                self.settings.offset_sigma,
+            ),
         ];
         for (i, (residual, sigma)) in brightness.into_iter().enumerate() {
             let information = 1.0 / (sigma * sigma);

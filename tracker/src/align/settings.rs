@@ -44,7 +44,7 @@ impl Default for AlignSettings {
             max_iterations: 8,
             huber: 1.345,
             photometric_correlation: 8.0,
-            depth_correlation: 6.0,
+            depth_correlation: 20.0,
             min_depth_sigma: 3e-5,
             dark_intensity: 0.02,
             gain_sigma: 0.05,

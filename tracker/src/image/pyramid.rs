@@ -54,7 +54,11 @@ impl<'m> GreyPyramid<'m> {
     ///
     /// # Errors
     /// [`WorkspaceError`] when the arena is exhausted.
-    pub fn carve(arena: &mut Arena<'m>, camera: &PinholeCamera, levels: usize) -> Result<Self, WorkspaceError> {
+    pub fn carve(
+        arena: &mut Arena<'m>,
+        camera: &PinholeCamera,
+        levels: usize,
+    ) -> Result<Self, WorkspaceError> {
         let mut pyramid = Self { levels: ArrayVec::new() };
         for level in 0..levels.min(MAX_LEVELS) {
             let (width, height) = (camera.width >> level, camera.height >> level);

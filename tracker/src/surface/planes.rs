@@ -67,9 +67,8 @@ impl<'m> SurfacePlanes<'m> {
         }
         let (i, j) = ((u + 0.5) as usize, (v + 0.5) as usize);
         let index = j * self.width + i;
-        let rho = self.value[index]
-            + self.slope_u[index] * (u - i as f32)
-            + self.slope_v[index] * (v - j as f32);
+        let rho =
+            self.value[index] + self.slope_u[index] * (u - i as f32) + self.slope_v[index] * (v - j as f32);
         (self.value[index] > 0.0 && rho > 0.0).then_some(rho)
     }
 }

@@ -3,6 +3,7 @@
 use core::mem;
 
 use arrayvec::ArrayVec;
+use fearless_simd::Level;
 use nalgebra::Vector6;
 
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
@@ -10,8 +11,8 @@ use super::frame::Frame;
 use super::history::Motion;
 use super::result::{FrameResult, FrameStatus};
 use crate::align::{
-    AlignScratch, Estimate, FrameData, LevelOutcome, MotionPrior, ReferenceData, StopReason, align_level,
-    blur_length,
+    AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, MotionPrior, ReferenceData, StopReason,
+    align_level, blur_length,
 };
 use crate::error::{ConfigError, FrameError};
 use crate::geometry::RigidTransform;
@@ -26,6 +27,7 @@ use crate::workspace::Arena;
 /// Estimates camera poses at shutter opening and closing, frame by frame.
 #[derive(Debug)]
 pub struct Tracker<'m> {
+    simd: Level,
     config: TrackerConfig,
     luminance: LuminanceTable,
     pyramid: GreyPyramid<'m>,
@@ -38,14 +40,15 @@ pub struct Tracker<'m> {
 }
 
 impl<'m> Tracker<'m> {
-    /// Builds a tracker in the caller's memory of at least [`super::workspace_len`] bytes.
+    /// Builds a tracker that runs on instruction set `simd` in the caller's memory of at least [`super::workspace_len`] bytes.
     ///
     /// # Errors
     /// [`ConfigError`] when a setting is outside its range or the memory is too short.
-    pub fn new(config: &TrackerConfig, memory: &'m mut [u8]) -> Result<Self, ConfigError> {
+    pub fn new(config: &TrackerConfig, simd: Level, memory: &'m mut [u8]) -> Result<Self, ConfigError> {
         config.validate()?;
         let mut arena = Arena::new(memory);
         Ok(Self {
+            simd,
             luminance: LuminanceTable::new(&config.response),
             pyramid: GreyPyramid::carve(&mut arena, &config.camera, config.levels)?,
             depth: InverseDepthMap::carve(&mut arena, &config.camera, config.surface_level)?,
@@ -151,7 +154,14 @@ impl<'m> Tracker<'m> {
         };
         let data = FrameData { pyramid: &self.pyramid, depth: &self.depth };
         let inverse_depth = typical_inverse_depth(&self.keyframe);
-        let brightness_mean = (1.0, 0.0);
+        let alignment = Alignment {
+            simd: self.simd,
+            camera: config.camera,
+            reference,
+            frame: data,
+            expected_brightness: BrightnessModel::default(),
+            settings: &config.align,
+        };
         let coarsest = config.levels - 1;
         let mut iterations = 0;
         let mut best: Option<LevelOutcome> = None;
@@ -168,18 +178,7 @@ impl<'m> Tracker<'m> {
                 let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
                 estimate.keyframe_from_camera =
                     ExposureTrajectory::from_mid_and_motion(&mid, &prior.expected);
-                let result = align_level(
-                    level,
-                    &config.camera,
-                    reference,
-                    data,
-                    estimate,
-                    &prior,
-                    brightness_mean,
-                    2,
-                    &config.align,
-                    &mut self.scratch,
-                );
+                let result = align_level(&alignment, level, estimate, &prior, 2, &mut self.scratch);
                 iterations += result.iterations;
                 estimate = result.estimate;
                 outcome = Some(result);
@@ -198,15 +197,11 @@ impl<'m> Tracker<'m> {
             let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
             let estimate = oriented(outcome.estimate, &prior);
             outcome = align_level(
+                &alignment,
                 level,
-                &config.camera,
-                reference,
-                data,
                 estimate,
                 &prior,
-                brightness_mean,
                 if level == 0 { 1 } else { 2 },
-                &config.align,
                 &mut self.scratch,
             );
             iterations += outcome.iterations;
@@ -225,8 +220,7 @@ impl<'m> Tracker<'m> {
     ) -> FrameResult {
         let inverse_depth = typical_inverse_depth(&self.keyframe);
         let mid = outcome.estimate.keyframe_from_camera.mid();
-        let prior =
-            local.expected_motion(&mid, dt, frame.exposure, &self.config.camera, inverse_depth);
+        let prior = local.expected_motion(&mid, dt, frame.exposure, &self.config.camera, inverse_depth);
         let estimate = oriented(outcome.estimate, &prior);
         let blur =
             blur_length(&estimate.keyframe_from_camera, self.keyframe.keypoints()[0], &self.config.camera);

@@ -1,12 +1,12 @@
 //! The photometric term of one pyramid level: robust cost and normal equations over all patches.
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{SMatrix, SVector};
 
+use super::accumulate::{NormalEquations, Whitening};
+use super::kernel::TransferKernel;
 use super::problem::{PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem};
-use super::reference;
-use super::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV};
-use crate::math::sqrt_f32;
 
 /// How residuals are weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,93 +50,135 @@ impl Default for PhotometricSums {
 }
 
 /// Robust cost of every patch; `patches` has the length of `sites`. Returns the sums over all patches.
+///
+/// `level` is the instruction set to use; results differ between levels by rounding only. A pixel whose
+/// prediction, observation or variance is not finite does not count.
 pub fn evaluate_cost(
+    level: Level,
     problem: &TransferProblem,
     sites: &[PatchSite],
     model: &ResidualModel,
     patches: &mut [PatchCost],
 ) -> PatchCost {
-    let mut values = PatchValues::default();
-    let mut total = PatchCost::default();
-    for (site, patch) in sites.iter().zip(patches) {
-        reference::patch_values(problem, site, &mut values);
-        *patch = PatchCost::default();
-        for k in 0..PATCH_PIXELS {
-            if values.valid[k] > 0.0 {
-                let (r, _) = whitened_residual(problem, site, model, k, values.mean[k]);
-                patch.cost += huber(r, model.huber).0;
-                patch.pixels += 1.0;
-            }
-        }
-        total.cost += patch.cost;
-        total.pixels += patch.pixels;
-    }
-    total
+    dispatch!(level, simd => cost_of_patches(simd, problem, sites, model, patches))
 }
 
-/// Normal equations and robust cost of all patches.
+/// Normal equations and robust cost of all patches; see [`evaluate_cost`].
 pub fn linearize(
+    level: Level,
     problem: &TransferProblem,
     sites: &[PatchSite],
     model: &ResidualModel,
     patches: &mut [PatchCost],
 ) -> PhotometricSums {
-    let mut rows = PatchRows::default();
-    let mut sums = PhotometricSums::default();
-    for (site, patch) in sites.iter().zip(patches) {
-        reference::patch_rows(problem, site, &mut rows);
-        *patch = PatchCost::default();
-        let mut h = [[0.0f32; ROW_LENGTH]; ROW_LENGTH];
-        let mut g = [0.0f32; ROW_LENGTH];
-        for k in 0..PATCH_PIXELS {
-            if rows.values.valid[k] <= 0.0 {
-                continue;
-            }
-            let (r, inverse_sigma) = whitened_residual(problem, site, model, k, rows.values.mean[k]);
-            let (cost, weight) = huber(r, model.huber);
-            patch.cost += cost;
-            patch.pixels += 1.0;
-            let mut row = [0.0f32; ROW_LENGTH];
-            for (entry, column) in row.iter_mut().zip(&rows.pose) {
-                *entry = problem.brightness.gain * inverse_sigma * column[k];
-            }
-            row[12] = inverse_sigma * rows.values.mean[k];
-            row[13] = inverse_sigma;
-            for i in 0..ROW_LENGTH {
-                let weighted = weight * row[i];
-                g[i] += weighted * r;
-                for j in i..ROW_LENGTH {
-                    h[i][j] += weighted * row[j];
-                }
-            }
-        }
-        sums.cost += f64::from(patch.cost);
-        sums.pixels += f64::from(patch.pixels);
-        for i in 0..ROW_LENGTH {
-            sums.gradient[i] += f64::from(g[i]);
-            for j in i..ROW_LENGTH {
-                sums.hessian[(i, j)] += f64::from(h[i][j]);
-            }
-        }
-    }
-    sums.hessian.fill_lower_triangle_with_upper_triangle();
-    sums
+    dispatch!(level, simd => sums_of_patches(simd, problem, sites, model, patches))
 }
 
-/// Residual in standard deviations and the factor `1/sigma` it was divided by.
-fn whitened_residual(
+/// Predicted intensities of every patch; `out` has the length of `sites`.
+pub fn transfer_values(
+    level: Level,
     problem: &TransferProblem,
-    site: &PatchSite,
+    sites: &[PatchSite],
+    out: &mut [PatchValues],
+) {
+    dispatch!(level, simd => values_of_patches(simd, problem, sites, out));
+}
+
+/// Predicted intensities of every patch and their derivatives; `out` has the length of `sites`.
+pub fn transfer_rows(level: Level, problem: &TransferProblem, sites: &[PatchSite], out: &mut [PatchRows]) {
+    dispatch!(level, simd => rows_of_patches(simd, problem, sites, out));
+}
+
+/// The part of [`linearize`] that follows [`transfer_rows`]: `rows` and `patches` have the length of `sites`.
+pub fn accumulate_rows(
+    level: Level,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    rows: &[PatchRows],
     model: &ResidualModel,
-    k: usize,
-    mean: f32,
-) -> (f32, f32) {
-    let u = (i32::from(site.u) + PATTERN_DU[k]) as usize;
-    let v = (i32::from(site.v) + PATTERN_DV[k]) as usize;
-    let observed = problem.current.pixels[v * problem.current.width + u];
-    let inverse_sigma = 1.0 / sqrt_f32(model.read_variance + model.photon_variance * observed);
-    let predicted = problem.brightness.gain * mean + problem.brightness.offset;
-    ((predicted - observed) * inverse_sigma, inverse_sigma)
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    dispatch!(level, simd => sums_of_rows(simd, problem, sites, rows, model, patches))
+}
+
+#[inline(always)]
+fn cost_of_patches<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PatchCost {
+    patches.fill(PatchCost::default());
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return PatchCost::default() };
+    let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+    let mut values = PatchValues::default();
+    let (mut cost, mut pixels) = (0.0, 0.0);
+    for (site, patch) in sites.iter().zip(patches) {
+        kernel.patch_values(site, &mut values);
+        *patch = whitening.cost(site, &values);
+        cost += f64::from(patch.cost);
+        pixels += f64::from(patch.pixels);
+    }
+    PatchCost { cost: cost as f32, pixels: pixels as f32 }
+}
+
+#[inline(always)]
+fn sums_of_patches<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    patches.fill(PatchCost::default());
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return PhotometricSums::default() };
+    let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+    let mut rows = PatchRows::default();
+    let mut sums = NormalEquations::new(simd);
+    for (site, patch) in sites.iter().zip(patches) {
+        kernel.patch_rows(site, &mut rows);
+        *patch = sums.add(&whitening, site, &rows);
+    }
+    sums.finish()
+}
+
+#[inline(always)]
+fn values_of_patches<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    out: &mut [PatchValues],
+) {
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchValues::default()) };
+    for (site, values) in sites.iter().zip(out) {
+        kernel.patch_values(site, values);
+    }
+}
+
+#[inline(always)]
+fn rows_of_patches<S: Simd>(simd: S, problem: &TransferProblem, sites: &[PatchSite], out: &mut [PatchRows]) {
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchRows::default()) };
+    for (site, rows) in sites.iter().zip(out) {
+        kernel.patch_rows(site, rows);
+    }
+}
+
+#[inline(always)]
+fn sums_of_rows<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    rows: &[PatchRows],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+    let mut sums = NormalEquations::new(simd);
+    for ((site, rows), patch) in sites.iter().zip(rows).zip(patches) {
+        *patch = sums.add(&whitening, site, rows);
+    }
+    sums.finish()
 }
 
 /// Huber cost `rho(r)` and weight `rho'(r)/r` with threshold `delta`.

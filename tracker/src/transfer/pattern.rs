@@ -13,6 +13,22 @@ pub const PATTERN_DU: [i32; PATCH_PIXELS] = chessboard(true);
 /// Row offsets of the pattern, see [`PATTERN_DU`].
 pub const PATTERN_DV: [i32; PATCH_PIXELS] = chessboard(false);
 
+/// [`PATTERN_DU`] for kernels.
+pub(super) const PATTERN_DU_F32: [f32; PATCH_PIXELS] = in_f32(&PATTERN_DU);
+
+/// [`PATTERN_DV`] for kernels.
+pub(super) const PATTERN_DV_F32: [f32; PATCH_PIXELS] = in_f32(&PATTERN_DV);
+
+const fn in_f32(offsets: &[i32; PATCH_PIXELS]) -> [f32; PATCH_PIXELS] {
+    let mut floats = [0.0; PATCH_PIXELS];
+    let mut k = 0;
+    while k < PATCH_PIXELS {
+        floats[k] = offsets[k] as f32;
+        k += 1;
+    }
+    floats
+}
+
 const fn chessboard(columns: bool) -> [i32; PATCH_PIXELS] {
     let mut offsets = [0; PATCH_PIXELS];
     let mut k = 0;

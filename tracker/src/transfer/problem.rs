@@ -9,7 +9,8 @@ use super::virtual_view::VirtualView;
 /// rotations), gain, offset.
 pub const ROW_LENGTH: usize = 14;
 
-/// One level of an image pyramid: linear intensities in `[0, 1]`, row-major without padding.
+/// One level of an image pyramid: linear intensities in `[0, 1]`, row-major without padding; at least 2x2 and at
+/// most 2^24 pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct LevelImage<'a> {
     /// `width * height` intensities.
@@ -58,7 +59,7 @@ pub struct TransferProblem<'a> {
     pub focal: [f32; 2],
     /// Principal point `(cx, cy)` of this level, pixels.
     pub centre: [f32; 2],
-    /// Virtual views of the exposure; not empty.
+    /// Virtual views of the exposure; at least one, at most [`super::MAX_VIRTUAL_VIEWS`] (more are ignored).
     pub views: &'a [VirtualView],
     /// Photometric relation.
     pub brightness: BrightnessModel,

@@ -1,9 +1,9 @@
-//! Plain scalar transfer kernels: the oracle that every SIMD level is tested against. Kept for good.
+//! Scalar transfer of a patch: predicted intensities and their derivatives.
 
-use super::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV};
-use super::problem::{LevelImage, PatchRows, PatchSite, PatchValues, TransferProblem};
-use super::virtual_view::VirtualView;
 use crate::math::floor_to_i32;
+use crate::transfer::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV};
+use crate::transfer::problem::{LevelImage, PatchRows, PatchSite, PatchValues, TransferProblem};
+use crate::transfer::virtual_view::VirtualView;
 
 /// Smallest distance from a virtual camera to the keypoint's plane, metres: nearer or behind, the transfer is
 /// mirrored or meaningless.
@@ -49,6 +49,7 @@ pub struct Transferred {
 /// What a patch and a virtual view share for all pixels of the patch.
 struct PatchView {
     ray: [f32; 3],
+    inverse_depth: f32,
     plane_distance: f32,
     slope: [f32; 2],
     shift: [f32; 2],
@@ -64,6 +65,7 @@ impl PatchView {
             ray: core::array::from_fn(|i| {
                 view.rotation[i][0] * x + view.rotation[i][1] * y + view.rotation[i][2]
             }),
+            inverse_depth: rho,
             plane_distance,
             slope: [problem.focal[0] * rho * plane_distance, problem.focal[1] * rho * plane_distance],
             shift: [
@@ -75,7 +77,7 @@ impl PatchView {
 
     fn transfer(&self, view: &VirtualView, pixel: usize) -> Option<Transferred> {
         let r: [f32; 3] = core::array::from_fn(|i| self.ray[i] + view.pattern_offset[i][pixel]);
-        if !(r[2] > MIN_RAY_Z && self.plane_distance > MIN_PLANE_DISTANCE) {
+        if !(r[2] > MIN_RAY_Z && self.plane_distance > MIN_PLANE_DISTANCE && self.inverse_depth > 0.0) {
             return None;
         }
         let z = 1.0 / r[2];
@@ -106,7 +108,7 @@ pub fn patch_values(problem: &TransferProblem, site: &PatchSite, out: &mut Patch
                 None => all_valid = false,
             }
         }
-        if all_valid {
+        if all_valid && (sum * scale).is_finite() {
             out.mean[k] = sum * scale;
             out.valid[k] = 1.0;
         }
@@ -136,7 +138,7 @@ pub fn patch_rows(problem: &TransferProblem, site: &PatchSite, out: &mut PatchRo
             let (translation, rotation) = pose_row(&patch_view, &t, gu, gv);
             accumulate_ends(view, &translation, &rotation, &mut row);
         }
-        if all_valid {
+        if all_valid && (sum * scale).is_finite() && row.iter().all(|entry| entry.is_finite()) {
             out.values.mean[k] = sum * scale;
             out.values.valid[k] = 1.0;
             for (column, value) in out.pose.iter_mut().zip(row) {

@@ -50,7 +50,9 @@ impl<'m> Keyframe<'m> {
             level += 1;
         }
         let surface = (width >> surface_level) * (height >> surface_level);
-        sum + slice_bytes::<f32>(width * height) + 4 * slice_bytes::<f32>(surface) + levels * slice_bytes::<Keypoint>(MAX_KEYPOINTS)
+        sum + slice_bytes::<f32>(width * height)
+            + 4 * slice_bytes::<f32>(surface)
+            + levels * slice_bytes::<Keypoint>(MAX_KEYPOINTS)
     }
 
     /// Takes the memory of a keyframe.

@@ -39,7 +39,7 @@ pub struct TrackerConfig {
     /// Richardson-Lucy iterations on a keyframe.
     pub deblur_iterations: usize,
     /// debug
-    pub debug: Option<fn(usize,&[f32],&[f32])>,
+    pub debug: Option<fn(usize, &[f32], &[f32])>,
     /// Whether the first guess may be changed by trying several motions on the coarse levels.
     pub hypotheses: bool,
 }
@@ -64,7 +64,8 @@ impl TrackerConfig {
             surface_level,
             reference: ReferenceMode::Deblurred,
             align: AlignSettings::default(),
-            deblur_iterations: 5, debug: None,
+            deblur_iterations: 5,
+            debug: None,
             hypotheses: true,
         }
     }
@@ -126,7 +127,11 @@ pub const fn workspace_len(width: usize, height: usize, levels: usize, surface_l
     let scratch = slice_bytes::<PatchSite>(MAX_KEYPOINTS)
         + slice_bytes::<PatchCost>(MAX_KEYPOINTS)
         + slice_bytes::<f32>(SCALE_SAMPLES);
-    ARENA_ALIGNMENT + frame + Keyframe::bytes(width, height, levels, surface_level) + scratch + DeblurScratch::bytes(width, height)
+    ARENA_ALIGNMENT
+        + frame
+        + Keyframe::bytes(width, height, levels, surface_level)
+        + scratch
+        + DeblurScratch::bytes(width, height)
 }
 
 /// Upper bound of the residuals that a robust scale is computed from.

@@ -199,14 +199,7 @@ impl<'m> Tracker<'m> {
             let mid = outcome.estimate.keyframe_from_camera.mid();
             let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
             let estimate = oriented(outcome.estimate, &prior);
-            outcome = align_level(
-                &alignment,
-                level,
-                estimate,
-                &prior,
-                2,
-                &mut self.scratch,
-            );
+            outcome = align_level(&alignment, level, estimate, &prior, 2, &mut self.scratch);
             iterations += outcome.iterations;
         }
         (outcome, iterations)
@@ -292,17 +285,27 @@ impl<'m> Tracker<'m> {
         let Some(exposure) = self.keyframe.keyframe_from_camera else { return };
         let keyframe = &mut self.keyframe;
         let typical = typical_inverse_depth(keyframe) as f32;
-        self.deblur.flow.fill(&exposure, &self.config.camera, &keyframe.planes, self.config.surface_level, typical);
+        let longest = self.deblur.flow.fill(
+            &exposure,
+            &self.config.camera,
+            &keyframe.planes,
+            self.config.surface_level,
+            typical,
+        );
         let sharp = &mut keyframe.pyramid.levels[0];
         keyframe.captured.copy_from_slice(sharp.pixels);
-        let views = ((keyframe.blur * 0.7) as usize + 1).clamp(3, 24);
-        for _ in 0..self.config.deblur_iterations {
-            let residual = self.deblur.iterate(self.simd, views, keyframe.captured, sharp.pixels);
-            let _ = residual;
-        }
+        self.deblur.deblur(
+            self.simd,
+            longest,
+            self.config.deblur_iterations,
+            keyframe.captured,
+            sharp.pixels,
+        );
         keyframe.pyramid.reduce();
         keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity);
-        if let Some(sink) = self.config.debug { sink(keyframe.frame_index, keyframe.captured, keyframe.pyramid.levels[0].pixels); }
+        if let Some(sink) = self.config.debug {
+            sink(keyframe.frame_index, keyframe.captured, keyframe.pyramid.levels[0].pixels);
+        }
     }
 }
 

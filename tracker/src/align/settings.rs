@@ -12,7 +12,7 @@ pub struct AlignSettings {
     pub view_spacing: f32,
     /// Upper bound of virtual views per exposure.
     pub max_views: usize,
-    /// Levenberg-Marquardt iterations per pyramid level, at the most.
+    /// Linearisations per pyramid level, at the most.
     pub max_iterations: usize,
     /// Huber threshold in robust standard deviations.
     pub huber: f32,

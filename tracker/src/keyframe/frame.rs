@@ -5,7 +5,7 @@ use arrayvec::ArrayVec;
 use super::select::{Keypoint, SelectionSettings, select_keypoints};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
-use crate::surface::{InverseDepthMap, SurfacePlanes};
+use crate::surface::{InverseDepthMap, SurfacePlanes, fuse_depth};
 use crate::trajectory::ExposureTrajectory;
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
@@ -25,6 +25,9 @@ pub struct Keyframe<'m> {
     pub depth: InverseDepthMap<'m>,
     /// Surface planes of `depth`.
     pub planes: SurfacePlanes<'m>,
+    /// Measurements behind every value of `depth`.
+    weights: &'m mut [f32],
+    fusions: usize,
     keypoints: ArrayVec<&'m mut [Keypoint], MAX_LEVELS>,
     counts: [usize; MAX_LEVELS],
     /// `world_from_keyframe` at mid exposure.
@@ -43,7 +46,7 @@ impl<'m> Keyframe<'m> {
     pub const fn bytes(width: usize, height: usize, levels: usize, surface_level: usize) -> usize {
         let surface = (width >> surface_level) * (height >> surface_level);
         GreyPyramid::bytes(width, height, levels)
-            + 4 * slice_bytes::<f32>(surface)
+            + 5 * slice_bytes::<f32>(surface)
             + levels * slice_bytes::<Keypoint>(MAX_KEYPOINTS)
     }
 
@@ -61,6 +64,7 @@ impl<'m> Keyframe<'m> {
         let pyramid = GreyPyramid::carve(arena, camera, levels)?;
         let depth = InverseDepthMap::carve(arena, camera, surface_level)?;
         let planes = SurfacePlanes::carve(arena, camera, surface_level)?;
+        let weights = arena.take(depth.values.len())?;
         for _ in 0..levels.min(MAX_LEVELS) {
             keypoints.push(arena.take(MAX_KEYPOINTS)?);
         }
@@ -68,6 +72,8 @@ impl<'m> Keyframe<'m> {
             pyramid,
             depth,
             planes,
+            weights,
+            fusions: 0,
             keypoints,
             counts: [0; MAX_LEVELS],
             world_from_keyframe: RigidTransform::identity(),
@@ -94,6 +100,36 @@ impl<'m> Keyframe<'m> {
                 &settings,
                 keypoints,
             );
+        }
+    }
+
+    /// Starts anew with the depth map as it is: one measurement per pixel, planes fitted to it.
+    pub fn restart_surface(&mut self) {
+        self.weights.fill(1.0);
+        self.fusions = 0;
+        self.planes.fit(&self.depth);
+    }
+
+    /// Averages in the depth map of a frame at `keyframe_from_camera`; `camera` is that of the depth maps. Planes
+    /// and keypoint depths follow whenever the number of frames has doubled.
+    pub fn fuse_depth(
+        &mut self,
+        current: &InverseDepthMap,
+        keyframe_from_camera: &RigidTransform,
+        camera: &PinholeCamera,
+    ) {
+        fuse_depth(&mut self.depth, self.weights, current, keyframe_from_camera, camera);
+        self.fusions += 1;
+        if self.fusions.is_power_of_two() {
+            self.planes.fit(&self.depth);
+            for (level, keypoints) in self.keypoints.iter_mut().enumerate() {
+                let at = |x: f32| PinholeCamera::pixel_at_level(x, level, self.depth.level);
+                for keypoint in &mut keypoints[..self.counts[level]] {
+                    if let Some(rho) = self.planes.inverse_depth(at(keypoint.u), at(keypoint.v)) {
+                        keypoint.inverse_depth = rho;
+                    }
+                }
+            }
         }
     }
 

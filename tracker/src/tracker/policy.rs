@@ -82,7 +82,7 @@ pub(super) fn wants_keyframe(evidence: &Evidence, keyframe_blur: f32, image_widt
     let width = image_width as f32;
     let usable = evidence.depth_share > 0.15;
     let much_sharper = evidence.blur + 1.0 < 0.6 * keyframe_blur;
-    let far = evidence.overlap < 0.7 || evidence.flow > 0.12 * width;
+    let far = evidence.overlap < 0.6 || evidence.flow > 0.2 * width;
     let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(0.006 * width);
     let leaving = evidence.overlap < 0.45 || evidence.flow > 0.3 * width;
     usable && (much_sharper || (far && as_sharp) || leaving)

@@ -125,7 +125,7 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = Some(ExposureTrajectory::still(RigidTransform::identity()));
         self.keyframe.blur = 0.0;
         self.keyframe.frame_index = self.frames.saturating_sub(1);
-        self.keyframe.planes.fit(&self.keyframe.depth);
+        self.keyframe.restart_surface();
         self.select_keypoints();
         self.brightness = BrightnessModel::default();
         if self.motion.is_none() && self.last_timestamp.is_finite() {
@@ -349,6 +349,10 @@ impl<'m> Tracker<'m> {
             let exposure = world_from_camera.seen_from(&world_from_mid.inverse());
             self.promote(&world_from_mid, Some(exposure), evidence.blur);
             result.is_keyframe = true;
+        } else if status == FrameStatus::Ok {
+            let camera = self.config.camera.at_level(self.config.surface_level);
+            let keyframe_from_mid = outcome.estimate.keyframe_from_camera.mid();
+            self.keyframe.fuse_depth(&self.depth, &keyframe_from_mid, &camera);
         }
         result
     }
@@ -415,7 +419,7 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
-        self.keyframe.planes.fit(&self.keyframe.depth);
+        self.keyframe.restart_surface();
         self.brightness = BrightnessModel::default();
         let deblurred = self.sharpen_keyframe();
         if !deblurred {

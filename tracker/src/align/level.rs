@@ -99,6 +99,8 @@ pub struct LevelPlan {
     pub depth_stride: usize,
     /// Linearisations at the most.
     pub max_iterations: usize,
+    /// Iterations stop when a step moves the image by less than this many pixels of the level.
+    pub min_step: f64,
     /// Whether the motion during the exposure is sampled; otherwise one view at mid exposure.
     pub blur: bool,
 }
@@ -218,7 +220,7 @@ fn descend(
             return Descent::Stopped(StopReason::Singular);
         };
         let pixels = step_in_pixels(&step, &objective.camera, objective.inverse_depth);
-        if pixels < objective.settings.min_step {
+        if pixels < plan.min_step {
             outcome.estimate = outcome.estimate.stepped(&step);
             return Descent::Stopped(StopReason::SmallStep);
         }

@@ -9,6 +9,7 @@
 //! dominates where it is exact and a blurred reference loses weight where it does not fit.
 
 mod damping;
+mod depth_accumulate;
 pub mod depth_term;
 mod level;
 mod measure;

@@ -139,7 +139,8 @@ impl Objective<'_> {
         expected_points: Option<f64>,
         sums: &mut Linearised,
     ) {
-        let depth_sums = depth.problem.linearise(&trajectory.mid(), depth.sigma, self.settings.huber);
+        let depth_sums =
+            depth.problem.linearise(self.simd, &trajectory.mid(), depth.sigma, self.settings.huber);
         let weight =
             depth.weight * expected_points.map_or(1.0, |expected| count_ratio(expected, depth_sums.points));
         let to_ends = mid_from_ends(trajectory);

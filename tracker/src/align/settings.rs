@@ -30,7 +30,8 @@ pub struct AlignSettings {
     pub offset_sigma: f64,
     /// A patch is dropped when its mean cost exceeds this multiple of the median over patches.
     pub outlier_factor: f32,
-    /// Iterations stop when a step moves the image by less than this many pixels of the level.
+    /// Iterations stop when a step moves the image by less than this many pixels of the level; coarse levels may
+    /// stop earlier.
     pub min_step: f64,
 }
 
@@ -50,7 +51,7 @@ impl Default for AlignSettings {
             gain_sigma: 0.05,
             offset_sigma: 0.005,
             outlier_factor: 6.0,
-            min_step: 0.02,
+            min_step: 0.03,
         }
     }
 }

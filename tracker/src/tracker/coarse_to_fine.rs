@@ -15,6 +15,9 @@ const COMPETING_LEVELS: usize = 2;
 /// A guess this much worse than what recent frames ended with is not trusted alone.
 const TRUSTED_SCORE_RATIO: f64 = 1.25;
 
+/// Steps below this many pixels of a competing level are left to the finer ones.
+const COMPETING_MIN_STEP: f64 = 0.1;
+
 /// Upper bound of first guesses.
 const MAX_GUESSES: usize = 6;
 
@@ -108,6 +111,7 @@ impl FrameTask<'_> {
         let plan = LevelPlan {
             level,
             depth_stride: if competing { 4 } else { 2 },
+            min_step: if competing { COMPETING_MIN_STEP } else { self.alignment.settings.min_step },
             max_iterations: self.alignment.settings.max_iterations,
             blur: self.blur,
         };

@@ -23,6 +23,23 @@ pub(super) struct BilinearSampler<'a, S: Simd> {
     last_cell_v: S::f32s,
 }
 
+/// Where a sample lies: the linear index of its top left pixel and the position between the four.
+#[derive(Clone, Copy)]
+pub(super) struct Cell<S: Simd> {
+    index: S::i32s,
+    fraction_u: S::f32s,
+    fraction_v: S::f32s,
+}
+
+impl<S: Simd> Cell<S> {
+    /// The first cell of any image.
+    #[inline(always)]
+    pub(super) fn first(simd: S) -> Self {
+        let zero = S::f32s::splat(simd, 0.0);
+        Self { index: S::i32s::splat(simd, 0), fraction_u: zero, fraction_v: zero }
+    }
+}
+
 /// Interpolated intensities and, per pixel of displacement, their derivatives.
 pub(super) struct Sampled<S: Simd> {
     pub(super) value: S::f32s,
@@ -61,23 +78,28 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
         (u.simd_ge(0.0) & u.simd_le(self.last_u)) & (v.simd_ge(0.0) & v.simd_le(self.last_v))
     }
 
-    /// Samples at `(u, v)`. Lanes outside the image return something unspecified, possibly NaN.
+    /// The cell that holds `(u, v)`; lanes outside the image get some cell of it.
     #[inline(always)]
-    pub(super) fn sample(&self, u: S::f32s, v: S::f32s) -> Sampled<S> {
+    pub(super) fn locate(&self, u: S::f32s, v: S::f32s) -> Cell<S> {
         // Truncation is floor for valid lanes. Clamping after it makes the cell valid whatever the lane holds.
         let cell_u = truncate::<S>(u).max(0.0).min(self.last_cell_u);
         let cell_v = truncate::<S>(v).max(0.0).min(self.last_cell_v);
         let index = cell_v.mul_add(self.width, cell_u).to_int::<S::i32s>();
-        let (fu, fv) = (u - cell_u, v - cell_v);
-        let (i00, i01) = self.pairs(self.top, &index);
-        let (i10, i11) = self.pairs(self.bottom, &index);
+        Cell { index, fraction_u: u - cell_u, fraction_v: v - cell_v }
+    }
+
+    /// Interpolates within a cell. Lanes outside the image return something unspecified, possibly NaN.
+    #[inline(always)]
+    pub(super) fn sample(&self, cell: &Cell<S>) -> Sampled<S> {
+        let (i00, i01) = self.pairs(self.top, &cell.index);
+        let (i10, i11) = self.pairs(self.bottom, &cell.index);
         let (du_top, du_bottom) = (i01 - i00, i11 - i10);
-        let t0 = du_top.mul_add(fu, i00);
-        let t1 = du_bottom.mul_add(fu, i10);
+        let t0 = du_top.mul_add(cell.fraction_u, i00);
+        let t1 = du_bottom.mul_add(cell.fraction_u, i10);
         let gradient_v = t1 - t0;
         Sampled {
-            value: gradient_v.mul_add(fv, t0),
-            gradient_u: (du_bottom - du_top).mul_add(fv, du_top),
+            value: gradient_v.mul_add(cell.fraction_v, t0),
+            gradient_u: (du_bottom - du_top).mul_add(cell.fraction_v, du_top),
             gradient_v,
         }
     }
@@ -86,9 +108,9 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
     #[inline(always)]
     fn pairs(&self, rows: &[f32], index: &S::i32s) -> (S::f32s, S::f32s) {
         let index = index.as_slice();
-        let half = S::u64s::LEN;
-        let low: S::f32s = S::u64s::from_fn(self.simd, |k| pair(rows, index[k])).bitcast();
-        let high: S::f32s = S::u64s::from_fn(self.simd, |k| pair(rows, index[half + k])).bitcast();
+        let half = S::f64s::LEN;
+        let low: S::f32s = S::f64s::from_fn(self.simd, |k| pair(rows, index[k])).bitcast();
+        let high: S::f32s = S::f64s::from_fn(self.simd, |k| pair(rows, index[half + k])).bitcast();
         (low.unzip_low(high), low.unzip_high(high))
     }
 }
@@ -100,7 +122,8 @@ fn truncate<S: Simd>(x: S::f32s) -> S::f32s {
 
 /// Two adjacent pixels in one word; the caller clamps `index`, so the bounds check never fails.
 #[inline(always)]
-fn pair(rows: &[f32], index: i32) -> u64 {
+fn pair(rows: &[f32], index: i32) -> f64 {
     let start = index as u32 as usize;
-    bytemuck::cast([rows[start], rows[start + 1]])
+    let cells = &rows[start..start + 2];
+    bytemuck::cast([cells[0], cells[1]])
 }

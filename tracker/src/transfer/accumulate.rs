@@ -195,8 +195,8 @@ impl<S: Simd> NormalEquations<S> {
 
     #[inline(always)]
     fn flush(&mut self) {
-        for (totals, lanes) in self.totals.iter_mut().zip(&mut self.lanes) {
-            for (total, lanes) in totals.iter_mut().zip(lanes) {
+        for (i, (totals, lanes)) in self.totals.iter_mut().zip(&mut self.lanes).enumerate() {
+            for (total, lanes) in totals[i..].iter_mut().zip(&mut lanes[i..]) {
                 *total += f64::from(lanes.reduce_sum());
                 *lanes = S::f32s::splat(self.simd, 0.0);
             }

@@ -91,8 +91,10 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
     /// Interpolates within a cell. Lanes outside the image return something unspecified, possibly NaN.
     #[inline(always)]
     pub(super) fn sample(&self, cell: &Cell<S>) -> Sampled<S> {
+        // Says to the compiler that the lengths are equal: what is in bounds of one is in bounds of the other.
+        let bottom = &self.bottom[..self.top.len()];
         let (i00, i01) = self.pairs(self.top, &cell.index);
-        let (i10, i11) = self.pairs(self.bottom, &cell.index);
+        let (i10, i11) = self.pairs(bottom, &cell.index);
         let (du_top, du_bottom) = (i01 - i00, i11 - i10);
         let t0 = du_top.mul_add(cell.fraction_u, i00);
         let t1 = du_bottom.mul_add(cell.fraction_u, i10);

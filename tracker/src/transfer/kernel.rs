@@ -66,7 +66,9 @@ pub(super) struct TransferKernel<'a, S: Simd> {
     problem: &'a TransferProblem<'a>,
     views: &'a [VirtualView],
     sampler: BilinearSampler<'a, S>,
+    /// `1/n` for n views.
     scale: f32,
+    inverse_focal: [f32; 2],
     patch_views: [PatchView; MAX_VIRTUAL_VIEWS],
     batch: [Located<S>; BATCH],
 }
@@ -86,6 +88,7 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
             views,
             sampler: BilinearSampler::new(simd, &problem.reference)?,
             scale: 1.0 / views.len() as f32,
+            inverse_focal: problem.focal.map(|focal| 1.0 / focal),
             patch_views: [PatchView::default(); MAX_VIRTUAL_VIEWS],
             batch: [Located { cell: Cell::first(simd), a: zero, b: zero }; BATCH],
         })
@@ -135,8 +138,8 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     fn prepare(&mut self, site: &PatchSite) -> bool {
         let [fx, fy] = self.problem.focal;
         let [cx, cy] = self.problem.centre;
-        let x = (f32::from(site.u) - cx) / fx;
-        let y = (f32::from(site.v) - cy) / fy;
+        let x = (f32::from(site.u) - cx) * self.inverse_focal[0];
+        let y = (f32::from(site.v) - cy) * self.inverse_focal[1];
         let rho = site.inverse_depth;
         let depth = 1.0 / rho;
         let mut in_front = rho > 0.0;

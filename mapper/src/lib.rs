@@ -1,1 +1,8 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
+
+pub mod dataset;
+mod error;
+mod text_lines;
+pub mod trajectory_file;
+
+pub use error::FileError;

@@ -19,6 +19,8 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod align;
+pub mod deblur;
 pub mod error;
 pub mod geometry;
 pub mod image;
@@ -27,6 +29,11 @@ pub mod math;
 pub mod photometric;
 pub mod simd;
 pub mod surface;
+mod tracker;
 pub mod trajectory;
 pub mod transfer;
 pub mod workspace;
+
+/// Instruction sets that the kernels can run on; chosen once, at construction.
+pub use fearless_simd::Level as SimdLevel;
+pub use tracker::{Frame, FrameResult, FrameStatus, ReferenceMode, Tracker, TrackerConfig, workspace_len};

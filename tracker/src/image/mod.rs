@@ -1,7 +1,12 @@
-//! Images in the caller's memory: views of input frames and linear-light pyramids.
+//! Images in the caller's memory: undistortion, views of input frames and linear-light pyramids.
 
 mod pyramid;
+mod undistort;
 mod view;
 
 pub use pyramid::{GreyLevel, GreyPyramid, MAX_LEVELS};
+pub use undistort::{
+    BufferSizeError, NO_SOURCE, PixelRectangle, SourcePosition, fill_source_map, region_with_source,
+    remap_bilinear, remap_nearest,
+};
 pub use view::{ColourView, DepthView, PixelFormat};

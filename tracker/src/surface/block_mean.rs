@@ -1,6 +1,7 @@
 //! Block means of a raw depth map.
 
 use crate::geometry::PinholeCamera;
+use crate::image::DepthView;
 use crate::workspace::{Arena, WorkspaceError};
 
 /// Inverse depth in 1/m on a pyramid level; 0 is missing.
@@ -38,19 +39,18 @@ impl<'m> InverseDepthMap<'m> {
         Ok(Self { values: arena.take(width * height)?, width, height, level })
     }
 
-    /// Fills the map from raw depth (`raw_width` columns, 0 = missing).
+    /// Fills the map from the rows of a raw depth image (0 = missing).
     ///
     /// A block is missing when fewer than half of its pixels are measured or when they spread over more than one
     /// surface: a mean across a depth edge lies on neither side. Returns the share of blocks with a value.
-    pub fn fill(&mut self, raw: &[u16], raw_width: usize, metres_per_unit: f32) -> f32 {
+    pub fn fill(&mut self, raw: &DepthView, metres_per_unit: f32) -> f32 {
         let block = 1usize << self.level;
         let mut measured = 0usize;
         for v in 0..self.height {
-            for u in 0..self.width {
-                let origin = (v * block) * raw_width + u * block;
-                let value = block_inverse_depth(&raw[origin..], raw_width, block, metres_per_unit);
-                measured += usize::from(value > 0.0);
-                self.values[v * self.width + u] = value;
+            let out = &mut self.values[v * self.width..][..self.width];
+            for (u, value) in out.iter_mut().enumerate() {
+                *value = block_inverse_depth(raw, u * block, v * block, block, metres_per_unit);
+                measured += usize::from(*value > 0.0);
             }
         }
         measured as f32 / (self.width * self.height).max(1) as f32
@@ -81,11 +81,11 @@ impl<'m> InverseDepthMap<'m> {
     }
 }
 
-fn block_inverse_depth(raw: &[u16], raw_width: usize, block: usize, metres_per_unit: f32) -> f32 {
+fn block_inverse_depth(raw: &DepthView, u: usize, v: usize, block: usize, metres_per_unit: f32) -> f32 {
     let (mut nearest, mut farthest) = (u16::MAX, 0u16);
     let (mut sum, mut count) = (0.0f32, 0usize);
     for row in 0..block {
-        for &value in &raw[row * raw_width..][..block] {
+        for &value in &raw.row(v + row)[u..][..block] {
             if value > 0 {
                 nearest = nearest.min(value);
                 farthest = farthest.max(value);

@@ -1,3 +1,4 @@
 //! Helpers shared by the whole-system tests.
 
+pub mod reference_values;
 pub mod transfer_scene;

@@ -1,3 +1,10 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
+pub mod dataset;
+mod error;
 pub mod evaluation;
+pub mod run;
+mod text_lines;
+pub mod trajectory_file;
+
+pub use error::FileError;

@@ -20,5 +20,6 @@
 extern crate std;
 
 pub mod geometry;
+pub mod image;
 pub mod math;
 pub mod trajectory;

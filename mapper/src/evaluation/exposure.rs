@@ -3,7 +3,9 @@
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use super::statistics::quantile;
+use crate::trajectory_file::TimedExposure;
+
+use super::{associate, quantile};
 
 /// Frames with less true blur than this, in pixels, say nothing about a relative error or a direction.
 pub const MIN_TRUE_BLUR_PX: f64 = 5.0;
@@ -35,11 +37,34 @@ pub struct BlurEvaluation {
     pub direction_share: Option<f64>,
 }
 
-/// Compares exposures pairwise; `median_depth` (metres, positive) is the distance at which blur is measured.
+/// The linear motion between a recorded exposure's ends. Only the ends count: blur length and direction do not depend
+/// on the path between them.
+#[must_use]
+pub fn motion_of(exposure: &TimedExposure) -> ExposureTrajectory {
+    ExposureTrajectory { start: exposure.start, end: exposure.end }
+}
+
+/// Compares the exposures of `reference` and `estimate` (both ascending in time) that are at most `max_dt` seconds
+/// apart; `median_depth` (metres, positive) is the distance at which blur is measured.
 ///
 /// Motions are compared in the camera's own frame, so the two world frames need no alignment.
 #[must_use]
 pub fn evaluate_blur(
+    reference: &[TimedExposure],
+    estimate: &[TimedExposure],
+    max_dt: f64,
+    camera: &PinholeCamera,
+    median_depth: f64,
+) -> BlurEvaluation {
+    let stamps = |list: &[TimedExposure]| list.iter().map(|e| e.timestamp).collect::<Vec<_>>();
+    let pairs: Vec<_> = associate(&stamps(reference), &stamps(estimate), max_dt)
+        .into_iter()
+        .map(|m| (motion_of(&reference[m.reference]), motion_of(&estimate[m.estimate])))
+        .collect();
+    compare_motions(&pairs, camera, median_depth)
+}
+
+fn compare_motions(
     pairs: &[(ExposureTrajectory, ExposureTrajectory)],
     camera: &PinholeCamera,
     median_depth: f64,
@@ -132,7 +157,7 @@ mod tests {
             // 2 px: does not count.
             (exposure(&here, sideways(0.008)), exposure(&there, sideways(-0.1))),
         ];
-        let e = evaluate_blur(&pairs, &CAMERA, 2.0);
+        let e = compare_motions(&pairs, &CAMERA, 2.0);
         assert_eq!(e.blurred_frames, 3);
         assert!((e.median_relative_error.unwrap() - 0.1).abs() < 1e-9);
         assert!((e.direction_share.unwrap() - 2.0 / 3.0).abs() < 1e-12);
@@ -145,13 +170,13 @@ mod tests {
         let here = RigidTransform::identity();
         let reference = exposure(&here, [0.01, 0.0, 0.0, 0.0, 0.02, 0.0]);
         let estimate = exposure(&here, [-0.01, 0.0, 0.0, 0.0, 0.02, 0.0]);
-        assert!(evaluate_blur(&[(reference, estimate)], &CAMERA, 2.0).frames[0].same_direction);
+        assert!(compare_motions(&[(reference, estimate)], &CAMERA, 2.0).frames[0].same_direction);
     }
 
     #[test]
     fn sharp_sequences_have_no_blur_figures() {
         let still = ExposureTrajectory::still(RigidTransform::identity());
-        let e = evaluate_blur(&[(still, still)], &CAMERA, 2.0);
+        let e = compare_motions(&[(still, still)], &CAMERA, 2.0);
         assert_eq!((e.blurred_frames, e.median_relative_error, e.direction_share), (0, None, None));
     }
 }

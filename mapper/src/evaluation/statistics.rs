@@ -41,6 +41,19 @@ impl Statistics {
             max: sorted[sorted.len() - 1],
         })
     }
+
+    /// The same figures in another unit: every one times `factor` (positive).
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self {
+            rmse: self.rmse * factor,
+            mean: self.mean * factor,
+            median: self.median * factor,
+            std: self.std * factor,
+            min: self.min * factor,
+            max: self.max * factor,
+        }
+    }
 }
 
 /// The `q` quantile (0 to 1) of finite `values` by linear interpolation between order statistics; `None` when empty.

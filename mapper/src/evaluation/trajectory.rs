@@ -4,18 +4,11 @@ use mba_tracker::geometry::{RigidTransform, so3};
 use nalgebra::Vector3;
 use thiserror::Error;
 
+use crate::trajectory_file::TimedPose;
+
 use super::{
     Alignment, AlignmentError, DEFAULT_MAX_DT, Match, Similarity, Statistics, align, associate, share_within,
 };
-
-/// A camera pose at one time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TimedPose {
-    /// Seconds.
-    pub timestamp: f64,
-    /// Camera-to-world.
-    pub world_from_camera: RigidTransform,
-}
 
 /// A frame whose position error is at most this many metres counts as good: one bad frame can decide an RMSE, it
 /// cannot decide this share.

@@ -1,0 +1,109 @@
+//! The command line.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
+
+/// Motion-blur-aware RGB-D tracking on a CPU.
+#[derive(Debug, Parser)]
+#[command(name = "mba", version, propagate_version = true, max_term_width = 100)]
+pub struct Cli {
+    /// Options of every command.
+    #[command(flatten)]
+    pub global: Global,
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// Options of every command.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Global {
+    /// Print figures as JSON on stdout
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Worker threads; default: one per core. Results do not depend on it
+    #[arg(long, global = true, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+    /// No progress and no notes on stderr
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// More notes on stderr
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Measure an estimate against a reference
+    #[command(subcommand)]
+    Eval(EvalCommand),
+}
+
+/// What to measure.
+#[derive(Debug, Subcommand)]
+pub enum EvalCommand {
+    /// Trajectory errors (ATE, RPE) as the evo package defines them, and blur figures
+    Trajectory(EvalTrajectory),
+}
+
+/// Arguments of `mba eval trajectory`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Files are TUM trajectories (timestamp tx ty tz qx qy qz qw) or exposures.txt files (timestamp, then the \
+pose at opening, middle and closing of the shutter). With two exposures files and --dataset the blur \
+figures are printed too.
+
+Examples:
+  mba eval trajectory --reference data/groundtruth.txt --estimate run/trajectory.txt
+  mba eval trajectory --reference data/groundtruth_exposure.txt --estimate run/exposures.txt --dataset data")]
+pub struct EvalTrajectory {
+    /// True trajectory or true exposures
+    #[arg(long, value_name = "FILE")]
+    pub reference: PathBuf,
+    /// Estimated trajectory or exposures
+    #[arg(long, value_name = "FILE")]
+    pub estimate: PathBuf,
+    /// Freedom given to the estimate before it is compared
+    #[arg(long, value_enum, default_value_t)]
+    pub align: AlignMode,
+    /// Largest time difference of a matched pair, in seconds
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_MAX_DT, value_parser = non_negative)]
+    pub max_dt: f64,
+    /// Data set of the exposures: its calibration and median depth turn motions into blur lengths
+    #[arg(long, value_name = "DIR")]
+    pub dataset: Option<PathBuf>,
+}
+
+/// Names of [`Alignment`] on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum AlignMode {
+    /// Rotation and translation
+    #[default]
+    Se3,
+    /// Rotation, translation and scale
+    Sim3,
+    /// As it is
+    None,
+}
+
+impl From<AlignMode> for Alignment {
+    fn from(mode: AlignMode) -> Self {
+        match mode {
+            AlignMode::Se3 => Self::Se3,
+            AlignMode::Sim3 => Self::Sim3,
+            AlignMode::None => Self::None,
+        }
+    }
+}
+
+/// A finite number that is not negative.
+fn non_negative(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
+        _ => Err("a number that is not negative is needed".to_owned()),
+    }
+}

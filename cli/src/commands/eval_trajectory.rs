@@ -1,0 +1,82 @@
+//! `mba eval trajectory`.
+
+use std::fs;
+use std::path::Path;
+
+use mba_mapper::evaluation::{
+    BlurFigures, TrajectoryError, TrajectoryFigures, TrajectoryOptions, evaluate_trajectory,
+};
+use mba_mapper::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
+use serde::Serialize;
+
+use crate::args::EvalTrajectory;
+use crate::console::Console;
+use crate::failure::OrBadInput;
+use crate::report::table;
+
+/// What is printed.
+#[derive(Serialize)]
+struct Report {
+    #[serde(flatten)]
+    trajectory: TrajectoryFigures,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    blur: Option<BlurFigures>,
+}
+
+/// Compares two files and prints the figures.
+///
+/// # Errors
+/// Bad input when a file is unreadable or the two do not belong together.
+pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
+    let reference = Poses::read(&args.reference)?;
+    let estimate = Poses::read(&args.estimate)?;
+    let options = TrajectoryOptions { alignment: args.align.into(), max_dt: args.max_dt };
+    let evaluation = evaluate_trajectory(&reference.trajectory, &estimate.trajectory, &options)
+        .map_err(|error| (hint(&error), error))
+        .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
+    let report = Report { trajectory: TrajectoryFigures::from(&evaluation), blur: None };
+    console.result(&report, |report| {
+        let mut text = table::trajectory(&report.trajectory);
+        if let Some(blur) = &report.blur {
+            text.push_str(&table::blur(blur));
+        }
+        text
+    })
+}
+
+fn hint(error: &TrajectoryError) -> &'static str {
+    match error {
+        TrajectoryError::TooFewMatches { .. } => {
+            "check that both files use the same clock, or raise --max-dt"
+        }
+        TrajectoryError::Alignment(_) => "use --align none, or compare a longer piece of trajectory",
+        TrajectoryError::NotFinite => "check the files for nan and inf",
+    }
+}
+
+/// A trajectory file of either kind.
+struct Poses {
+    trajectory: Vec<TimedPose>,
+    exposures: Option<Vec<TimedExposure>>,
+}
+
+impl Poses {
+    fn read(path: &Path) -> anyhow::Result<Self> {
+        const HINT: &str = "a TUM trajectory has lines `timestamp tx ty tz qx qy qz qw`";
+        if !has_three_poses(path) {
+            return Ok(Self { trajectory: read_trajectory(path).or_bad_input(HINT)?, exposures: None });
+        }
+        let exposures = read_exposures(path).or_bad_input(HINT)?;
+        let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };
+        Ok(Self { trajectory: exposures.iter().map(mid).collect(), exposures: Some(exposures) })
+    }
+}
+
+/// Whether the first line of numbers is that of an exposures file. A file that cannot be read is left to the reader,
+/// which has the better message.
+fn has_three_poses(path: &Path) -> bool {
+    const NUMBERS_PER_EXPOSURE: usize = 22;
+    let text = fs::read_to_string(path).unwrap_or_default();
+    let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
+    first.is_some_and(|line| line.split_whitespace().count() == NUMBERS_PER_EXPOSURE)
+}

@@ -1,0 +1,3 @@
+//! Results for people: tables in the terminal.
+
+pub mod table;

@@ -1,0 +1,79 @@
+//! `exposures.csv`: the exposure time of each frame of a camera that chooses it by itself.
+
+use std::path::Path;
+
+use super::association::associate;
+use super::sequence::FrameEntry;
+use super::{Calibration, DatasetError, Warning};
+use crate::FileError;
+use crate::text_lines::{Line, TextFile};
+
+const FILE_NAME: &str = "exposures.csv";
+const HEADER: &str = "a header line with the columns timestamp and exposure_s";
+const ROW: &str = "a row with a timestamp and a positive exposure_s in seconds";
+
+/// Gives each entry the exposure time of the row closest in time, at most half a frame interval away, or else the
+/// one of the calibration. Returns whether there is such a file.
+pub(super) fn read(
+    folder: &Path,
+    entries: &mut [FrameEntry],
+    calibration: &Calibration,
+    warnings: &mut Vec<Warning>,
+) -> Result<bool, DatasetError> {
+    let path = folder.join(FILE_NAME);
+    if !path.is_file() {
+        return Ok(false);
+    }
+    let (times, exposures) = read_rows(&path)?;
+    let frame_times: Vec<f64> = entries.iter().map(|entry| entry.timestamp).collect();
+    for (frame, row) in associate(&frame_times, &times, 0.5 / calibration.frame_rate) {
+        entries[frame].exposure_seconds = Some(exposures[row]);
+    }
+    let mut missing = entries.iter_mut().filter(|entry| entry.exposure_seconds.is_none()).peekable();
+    if let Some(first) = missing.peek().map(|entry| entry.timestamp) {
+        let fallback = calibration.fallback_exposure_seconds();
+        let count = missing.map(|entry| entry.exposure_seconds = Some(fallback)).count();
+        warnings.push(Warning::ExposureMissing { path, count, first, fallback });
+    }
+    Ok(true)
+}
+
+/// Timestamps and exposure times in seconds.
+fn read_rows(path: &Path) -> Result<(Vec<f64>, Vec<f64>), FileError> {
+    let file = TextFile::read(path)?;
+    let mut lines = file.lines();
+    let columns = match lines.next() {
+        Some(header) => columns(&header)?,
+        None => {
+            let (path, found) = (path.to_owned(), String::new());
+            return Err(FileError::MalformedLine { path, line: 1, found, expected: HEADER });
+        }
+    };
+    let (mut times, mut exposures) = (Vec::new(), Vec::new());
+    for line in lines {
+        let [timestamp, exposure] = row(&line, columns)?;
+        line.check_order(timestamp, times.last().copied())?;
+        times.push(timestamp);
+        exposures.push(exposure);
+    }
+    Ok((times, exposures))
+}
+
+/// Where the columns `timestamp` and `exposure_s` are.
+fn columns(header: &Line<'_>) -> Result<[usize; 2], FileError> {
+    let position = |name| header.text.split(',').position(|column| column.trim() == name);
+    match (position("timestamp"), position("exposure_s")) {
+        (Some(timestamp), Some(exposure)) => Ok([timestamp, exposure]),
+        _ => Err(header.malformed(HEADER)),
+    }
+}
+
+fn row(line: &Line<'_>, columns: [usize; 2]) -> Result<[f64; 2], FileError> {
+    let fields: Vec<&str> = line.text.split(',').map(str::trim).collect();
+    let mut values = [0.0; 2];
+    for (value, column) in values.iter_mut().zip(columns) {
+        let field = fields.get(column).ok_or_else(|| line.malformed(ROW))?;
+        *value = line.number(field, ROW)?;
+    }
+    if values[1] > 0.0 { Ok(values) } else { Err(line.malformed(ROW)) }
+}

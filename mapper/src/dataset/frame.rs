@@ -1,0 +1,96 @@
+//! One RGB-D frame and how its two images are decoded.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
+
+use super::FrameError;
+
+/// Colour and depth of one moment, undistorted and of the size of the calibration's camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RgbdFrame {
+    /// Index in the data set, from 0.
+    pub index: usize,
+    /// Mid exposure, seconds.
+    pub timestamp: f64,
+    /// Time the shutter was open, seconds.
+    pub exposure_seconds: f64,
+    /// Width in pixels.
+    pub width: usize,
+    /// Height in pixels.
+    pub height: usize,
+    /// Red, green, blue of each pixel as stored (not linear), row-major, `3 * width * height` values; black
+    /// where undistortion finds no source.
+    pub rgb: Vec<u8>,
+    /// Depth along the optical axis in raw units (`depth_scale` per metre), row-major, `width * height` values;
+    /// 0 = missing.
+    pub depth: Vec<u16>,
+}
+
+impl RgbdFrame {
+    /// Whether not a single pixel has a depth. Such a frame can still be used for its colours.
+    #[must_use]
+    pub fn depth_is_empty(&self) -> bool {
+        self.depth.iter().all(|depth| *depth == 0)
+    }
+}
+
+/// Decodes a colour image of `size` (width, height) into interleaved 8-bit RGB.
+pub(super) fn read_colour(path: &Path, size: (usize, usize)) -> Result<Vec<u8>, FrameError> {
+    Ok(decode(path, size, |_| Ok(()))?.into_rgb8().into_raw())
+}
+
+/// Decodes a 16-bit depth image of `size` (width, height).
+pub(super) fn read_depth(path: &Path, size: (usize, usize)) -> Result<Vec<u16>, FrameError> {
+    let check = |colour_type| match colour_type {
+        ColorType::L16 => Ok(()),
+        other => Err(FrameError::DepthFormat { path: path.to_owned(), found: format!("{other:?}") }),
+    };
+    Ok(decode(path, size, check)?.into_luma16().into_raw())
+}
+
+/// Width and height from the header of an image, if it has one.
+pub(super) fn image_size(path: &Path) -> Option<(usize, usize)> {
+    let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    Some((width as usize, height as usize))
+}
+
+/// Decodes an image after its size and `check` of its pixel type have been found good.
+fn decode(
+    path: &Path,
+    size: (usize, usize),
+    check: impl Fn(ColorType) -> Result<(), FrameError>,
+) -> Result<DynamicImage, FrameError> {
+    let damaged = |reason: String| FrameError::Damaged { path: path.to_owned(), reason };
+    let bytes = fs::read(path).map_err(|reason| FrameError::Unreadable { path: path.to_owned(), reason })?;
+    let reader = ImageReader::new(Cursor::new(&bytes))
+        .with_guessed_format()
+        .map_err(|error| damaged(error.to_string()))?;
+    if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(&bytes) {
+        return Err(damaged("the end marker of the JPEG stream is missing".into()));
+    }
+    let decoder = reader.into_decoder().map_err(|error| damaged(error.to_string()))?;
+    let (width, height) = decoder.dimensions();
+    let found = (width as usize, height as usize);
+    if found != size {
+        return Err(FrameError::SizeMismatch { path: path.to_owned(), found, expected: size });
+    }
+    check(decoder.color_type())?;
+    DynamicImage::from_decoder(decoder).map_err(|error| damaged(error.to_string()))
+}
+
+/// Whether an end-of-image marker follows the last scan: the decoder itself fills what is missing with grey.
+///
+/// Inside a scan the byte FF is always followed by 00 or a restart marker, so both searches are exact.
+fn jpeg_is_complete(bytes: &[u8]) -> bool {
+    const START_OF_SCAN: [u8; 2] = [0xFF, 0xDA];
+    const END_OF_IMAGE: [u8; 2] = [0xFF, 0xD9];
+    let marker = |wanted: [u8; 2]| bytes.windows(2).rposition(|pair| pair == wanted);
+    match (marker(START_OF_SCAN), marker(END_OF_IMAGE)) {
+        (Some(scan), Some(end)) => scan < end,
+        _ => false,
+    }
+}

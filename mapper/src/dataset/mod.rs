@@ -1,0 +1,74 @@
+//! Recorded RGB-D sequences: which layout a folder has, what its camera is, and its frames one by one.
+//!
+//! The native layout is that of the TUM RGB-D benchmark plus a `calibration.toml`. Timestamps are those of mid
+//! exposure; poses are `world_from_camera`.
+//!
+//! ```no_run
+//! let dataset = mba_mapper::dataset::open(std::path::Path::new("my_sequence"))?;
+//! for index in 0..dataset.len() {
+//!     match dataset.frame(index) {
+//!         Ok(frame) => println!("{} {}x{}", frame.timestamp, frame.width, frame.height),
+//!         Err(error) => eprintln!("skipping frame {index}: {error}"),
+//!     }
+//! }
+//! # Ok::<(), mba_mapper::dataset::DatasetError>(())
+//! ```
+
+mod association;
+mod calibration;
+mod calibration_file;
+mod error;
+mod exposure_list;
+mod frame;
+mod known_cameras;
+mod sequence;
+mod tum;
+
+use std::fs;
+use std::path::Path;
+
+use crate::FileError;
+pub use crate::trajectory_file::{TimedExposure, TimedPose};
+pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, Readout, Response};
+pub use error::{DatasetError, FrameError, Warning};
+pub use frame::RgbdFrame;
+pub use sequence::Dataset;
+
+/// How a data set is opened.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OpenOptions {
+    /// Largest time difference between a colour image and its depth image, seconds; not negative. Default 0.02.
+    pub association_tolerance: f64,
+}
+
+impl Default for OpenOptions {
+    fn default() -> Self {
+        Self { association_tolerance: 0.02 }
+    }
+}
+
+/// Opens the data set in `folder` with default options: recognises the layout, reads lists, calibration and
+/// ground truth, but no images.
+///
+/// # Errors
+///
+/// [`DatasetError`] if the folder is unreadable or of no known layout, or if lists, calibration or ground truth
+/// make no sense. What is merely odd ends up in [`Dataset::warnings`].
+pub fn open(folder: &Path) -> Result<Dataset, DatasetError> {
+    open_with(folder, &OpenOptions::default())
+}
+
+/// As [`open`], with options.
+///
+/// # Errors
+///
+/// As [`open`].
+pub fn open_with(folder: &Path, options: &OpenOptions) -> Result<Dataset, DatasetError> {
+    fs::read_dir(folder).map_err(|reason| FileError::Unreadable { path: folder.to_owned(), reason })?;
+    let contents = if tum::recognise(folder) {
+        tum::read(folder, options)?
+    } else {
+        return Err(DatasetError::UnknownLayout { folder: folder.to_owned() });
+    };
+    Dataset::new(folder, contents)
+}

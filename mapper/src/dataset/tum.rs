@@ -1,0 +1,225 @@
+//! The TUM RGB-D layout: lists of images with timestamps, a calibration, optional ground truth.
+
+use std::path::Path;
+
+use super::association::{associate, closest};
+use super::calibration::ASSUMED_EXPOSURE_SHARE;
+use super::known_cameras::{TUM_DEPTH_SCALE, TUM_FRAME_RATE, tum_camera};
+use super::sequence::{Contents, FrameEntry, frames_per_second};
+use super::{
+    Calibration, DatasetError, ExposureSource, OpenOptions, Readout, Response, Warning, calibration_file,
+    exposure_list,
+};
+use crate::FileError;
+use crate::text_lines::{Line, TextFile};
+use crate::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
+
+const ASSOCIATIONS: &str = "associations.txt";
+const COLOUR_LIST: &str = "rgb.txt";
+const DEPTH_LIST: &str = "depth.txt";
+
+/// One image of a list.
+struct ListedImage<'a> {
+    timestamp: f64,
+    /// Relative to the data set's folder.
+    file: &'a str,
+}
+
+/// Whether `folder` looks like this layout.
+pub(super) fn recognise(folder: &Path) -> bool {
+    let has = |name| folder.join(name).is_file();
+    has(ASSOCIATIONS) || (has(COLOUR_LIST) && has(DEPTH_LIST))
+}
+
+/// Reads lists, calibration and ground truth.
+pub(super) fn read(folder: &Path, options: &OpenOptions) -> Result<Contents, DatasetError> {
+    let mut warnings = Vec::new();
+    let associations = folder.join(ASSOCIATIONS);
+    let mut entries = if associations.is_file() {
+        read_associations(folder, &associations, options, &mut warnings)?
+    } else {
+        associate_lists(folder, options, &mut warnings)?
+    };
+    let mut calibration = read_calibration(folder, &entries, &mut warnings)?;
+    if exposure_list::read(folder, &mut entries, &calibration, &mut warnings)? {
+        calibration.exposure = ExposureSource::PerFrame;
+    }
+    let (ground_truth, ground_truth_exposures) = read_ground_truth(folder, &entries, &mut warnings)?;
+    Ok(Contents { calibration, colour_camera: None, entries, ground_truth, ground_truth_exposures, warnings })
+}
+
+/// Reads `timestamp file timestamp file` lines. The pairs are taken as they are; colour may come first (usual)
+/// or second (some sequences list `depth/...` first).
+fn read_associations(
+    folder: &Path,
+    path: &Path,
+    options: &OpenOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<FrameEntry>, DatasetError> {
+    let file = TextFile::read(path)?;
+    let mut entries: Vec<FrameEntry> = Vec::new();
+    let mut depth_times: Vec<f64> = Vec::new();
+    for line in file.lines() {
+        let (colour, depth) = parse_pair(&line)?;
+        line.check_order(colour.timestamp, entries.last().map(|entry| entry.timestamp))?;
+        depth_times.push(depth.timestamp);
+        entries.push(entry(folder, &colour, &depth));
+    }
+    if entries.is_empty() {
+        return Err(DatasetError::EmptyList { path: path.to_owned() });
+    }
+    warn_about_pairs(path, &entries, &depth_times, options, warnings);
+    Ok(entries)
+}
+
+fn parse_pair<'a>(line: &Line<'a>) -> Result<(ListedImage<'a>, ListedImage<'a>), FileError> {
+    const EXPECTED: &str = "timestamp image timestamp depth-image";
+    let fields: Vec<&str> = line.fields().collect();
+    let &[first_time, first_file, second_time, second_file] = fields.as_slice() else {
+        return Err(line.malformed(EXPECTED));
+    };
+    let first = ListedImage { timestamp: line.number(first_time, EXPECTED)?, file: first_file };
+    let second = ListedImage { timestamp: line.number(second_time, EXPECTED)?, file: second_file };
+    let is_depth = |image: &ListedImage<'_>| image.file.trim_start_matches("./").starts_with("depth");
+    if is_depth(&first) && !is_depth(&second) { Ok((second, first)) } else { Ok((first, second)) }
+}
+
+fn warn_about_pairs(
+    path: &Path,
+    entries: &[FrameEntry],
+    depth_times: &[f64],
+    options: &OpenOptions,
+    warnings: &mut Vec<Warning>,
+) {
+    let tolerance = options.association_tolerance;
+    let offsets = entries.iter().zip(depth_times).map(|(entry, depth)| (entry.timestamp - depth).abs());
+    // A microsecond of slack for timestamps that were rounded when written.
+    let loose = offsets.filter(|offset| *offset > tolerance + 1e-6);
+    let largest = loose.clone().fold(0.0, f64::max);
+    let count = loose.count();
+    if count > 0 {
+        warnings.push(Warning::LoosePairs { list: path.to_owned(), count, tolerance, largest });
+    }
+    let mut sorted = depth_times.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let reused: Vec<f64> = sorted.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
+    if let Some(&first) = reused.first() {
+        warnings.push(Warning::DepthReused { list: path.to_owned(), count: reused.len(), first });
+    }
+}
+
+/// Pairs the images of `rgb.txt` and `depth.txt` by time.
+fn associate_lists(
+    folder: &Path,
+    options: &OpenOptions,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<FrameEntry>, DatasetError> {
+    let tolerance = options.association_tolerance;
+    let (colour_list, depth_list) = (folder.join(COLOUR_LIST), folder.join(DEPTH_LIST));
+    let (colour_file, depth_file) = (TextFile::read(&colour_list)?, TextFile::read(&depth_list)?);
+    let colour = parse_list(&colour_file, &colour_list)?;
+    let depth = parse_list(&depth_file, &depth_list)?;
+    let times = |list: &[ListedImage<'_>]| list.iter().map(|image| image.timestamp).collect::<Vec<_>>();
+    let (colour_times, depth_times) = (times(&colour), times(&depth));
+
+    let pairs = associate(&colour_times, &depth_times, tolerance);
+    if pairs.is_empty() {
+        return Err(DatasetError::NoAssociation {
+            colour_list,
+            colour_count: colour.len(),
+            depth_list,
+            depth_count: depth.len(),
+            tolerance,
+            closest: closest(&colour_times, &depth_times),
+        });
+    }
+    let matched = |side: fn(&(usize, usize)) -> usize| pairs.iter().map(side).collect::<Vec<_>>();
+    warnings.extend(unmatched(&colour_list, &colour_times, &matched(|pair| pair.0), tolerance));
+    warnings.extend(unmatched(&depth_list, &depth_times, &matched(|pair| pair.1), tolerance));
+    Ok(pairs.into_iter().map(|(i, j)| entry(folder, &colour[i], &depth[j])).collect())
+}
+
+/// Parses `timestamp file` lines.
+fn parse_list<'a>(file: &'a TextFile, path: &Path) -> Result<Vec<ListedImage<'a>>, DatasetError> {
+    const EXPECTED: &str = "timestamp image";
+    let mut images: Vec<ListedImage<'a>> = Vec::new();
+    for line in file.lines() {
+        let fields: Vec<&str> = line.fields().collect();
+        let &[time, file] = fields.as_slice() else { return Err(line.malformed(EXPECTED).into()) };
+        let timestamp = line.number(time, EXPECTED)?;
+        line.check_order(timestamp, images.last().map(|image| image.timestamp))?;
+        images.push(ListedImage { timestamp, file });
+    }
+    if images.is_empty() { Err(DatasetError::EmptyList { path: path.to_owned() }) } else { Ok(images) }
+}
+
+fn unmatched(list: &Path, times: &[f64], matched: &[usize], tolerance: f64) -> Option<Warning> {
+    let mut is_matched = vec![false; times.len()];
+    for &index in matched {
+        is_matched[index] = true;
+    }
+    let first = is_matched.iter().position(|matched| !matched)?;
+    let count = times.len() - matched.len();
+    Some(Warning::Unmatched { list: list.to_owned(), count, first: times[first], tolerance })
+}
+
+fn entry(folder: &Path, colour: &ListedImage<'_>, depth: &ListedImage<'_>) -> FrameEntry {
+    FrameEntry {
+        timestamp: colour.timestamp,
+        colour: folder.join(colour.file),
+        depth: folder.join(depth.file),
+        exposure_seconds: None,
+    }
+}
+
+/// The calibration file or, without one, the calibration of a known camera.
+fn read_calibration(
+    folder: &Path,
+    entries: &[FrameEntry],
+    warnings: &mut Vec<Warning>,
+) -> Result<Calibration, DatasetError> {
+    let path = folder.join(calibration_file::FILE_NAME);
+    if path.is_file() {
+        let times: Vec<f64> = entries.iter().map(|entry| entry.timestamp).collect();
+        return calibration_file::read(&path, frames_per_second(&times), warnings);
+    }
+    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    let known = tum_camera(&absolute).ok_or_else(|| DatasetError::MissingCalibration {
+        folder: folder.to_owned(),
+        file: calibration_file::FILE_NAME,
+    })?;
+    warnings.push(Warning::KnownCamera { camera: known.name });
+    Ok(Calibration {
+        camera: known.camera,
+        distortion: known.distortion,
+        depth_scale: TUM_DEPTH_SCALE,
+        exposure: ExposureSource::Assumed { seconds: ASSUMED_EXPOSURE_SHARE / TUM_FRAME_RATE },
+        frame_rate: TUM_FRAME_RATE,
+        response: Response::Srgb,
+        readout: Readout::Rolling,
+    })
+}
+
+/// Reads `groundtruth.txt` and `groundtruth_exposure.txt` where they exist; the second can stand in for the
+/// first.
+fn read_ground_truth(
+    folder: &Path,
+    entries: &[FrameEntry],
+    warnings: &mut Vec<Warning>,
+) -> Result<(Vec<TimedPose>, Vec<TimedExposure>), DatasetError> {
+    let (poses_path, exposures_path) =
+        (folder.join("groundtruth.txt"), folder.join("groundtruth_exposure.txt"));
+    let exposures = if exposures_path.is_file() { read_exposures(&exposures_path)? } else { Vec::new() };
+    let poses = if poses_path.is_file() {
+        read_trajectory(&poses_path)?
+    } else {
+        let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };
+        exposures.iter().map(mid).collect()
+    };
+    if let (Some(first), Some(last), [first_frame, .., last_frame]) = (poses.first(), poses.last(), entries)
+        && (last.timestamp < first_frame.timestamp || first.timestamp > last_frame.timestamp)
+    {
+        warnings.push(Warning::GroundTruthElsewhere { path: poses_path });
+    }
+    Ok((poses, exposures))
+}

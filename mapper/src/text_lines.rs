@@ -1,0 +1,102 @@
+//! Lines of a text file: comments, fields, finite numbers, timestamps in order.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::FileError;
+
+/// A whole text file; lines that are blank or start with `#` are skipped but counted.
+pub(crate) struct TextFile {
+    path: PathBuf,
+    text: String,
+}
+
+/// One line and where it stands.
+#[derive(Clone, Copy)]
+pub(crate) struct Line<'a> {
+    path: &'a Path,
+    /// From 1.
+    pub(crate) number: usize,
+    /// Without surrounding white space.
+    pub(crate) text: &'a str,
+}
+
+impl TextFile {
+    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
+        match fs::read_to_string(path) {
+            Ok(text) => Ok(Self { path: path.to_owned(), text }),
+            Err(reason) => Err(FileError::Unreadable { path: path.to_owned(), reason }),
+        }
+    }
+
+    pub(crate) fn lines(&self) -> impl Iterator<Item = Line<'_>> {
+        self.text
+            .lines()
+            .enumerate()
+            .map(|(index, text)| Line { path: &self.path, number: index + 1, text: text.trim() })
+            .filter(|line| !line.text.is_empty() && !line.text.starts_with('#'))
+    }
+}
+
+impl<'a> Line<'a> {
+    /// Splits at white space and commas, as the TUM tools do.
+    pub(crate) fn fields(&self) -> impl Iterator<Item = &'a str> + use<'a> {
+        self.text.split([' ', '\t', ',']).filter(|field| !field.is_empty())
+    }
+
+    /// All fields as finite numbers, exactly `N` of them.
+    pub(crate) fn numbers<const N: usize>(&self, expected: &'static str) -> Result<[f64; N], FileError> {
+        let mut numbers = [0.0; N];
+        let mut fields = self.fields();
+        for number in &mut numbers {
+            let field = fields.next().ok_or_else(|| self.malformed(expected))?;
+            *number = self.number(field, expected)?;
+        }
+        if fields.next().is_some() {
+            return Err(self.malformed(expected));
+        }
+        Ok(numbers)
+    }
+
+    /// One field of this line as a finite number.
+    pub(crate) fn number(&self, field: &str, expected: &'static str) -> Result<f64, FileError> {
+        let number: f64 = field.parse().map_err(|_| self.malformed(expected))?;
+        if number.is_finite() {
+            Ok(number)
+        } else {
+            Err(FileError::NotFinite {
+                path: self.path.to_owned(),
+                line: self.number,
+                value: field.to_owned(),
+            })
+        }
+    }
+
+    /// The error of a line that is not `expected`.
+    pub(crate) fn malformed(&self, expected: &'static str) -> FileError {
+        FileError::MalformedLine {
+            path: self.path.to_owned(),
+            line: self.number,
+            found: self.text.chars().take(120).collect(),
+            expected,
+        }
+    }
+
+    /// Whether `timestamp`, found on this line, lies after `previous`.
+    pub(crate) fn check_order(&self, timestamp: f64, previous: Option<f64>) -> Result<(), FileError> {
+        let (path, line) = (self.path.to_owned(), self.number);
+        match previous {
+            Some(previous) if timestamp < previous => {
+                Err(FileError::TimestampOrder { path, line, timestamp, previous })
+            }
+            Some(previous) if timestamp == previous => {
+                Err(FileError::TimestampDoubled { path, line, timestamp })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    pub(crate) fn path(&self) -> &'a Path {
+        self.path
+    }
+}

@@ -1,0 +1,157 @@
+//! Trajectories as text: TUM lines with one pose per frame, and exposure lines with three.
+//!
+//! All poses are `world_from_camera`: translation in metres, then the unit quaternion as `qx qy qz qw`. Lines
+//! starting with `#` are comments.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use mba_tracker::geometry::RigidTransform;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+
+use crate::FileError;
+use crate::text_lines::{Line, TextFile};
+
+/// How far the length of a quaternion in a file may be from 1; what is accepted is normalised.
+///
+/// The TUM ground truth has four decimals, which leaves errors near 1e-4; a wrong order of the columns or a
+/// rotation vector in place of the quaternion is off by far more.
+pub const QUATERNION_LENGTH_TOLERANCE: f64 = 1e-2;
+
+/// The camera's pose at one instant, one line of a TUM trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedPose {
+    /// Seconds; mid exposure for a frame's pose.
+    pub timestamp: f64,
+    /// The camera's pose in the world.
+    pub world_from_camera: RigidTransform,
+}
+
+/// The camera's poses during the exposure of one frame, all `world_from_camera`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedExposure {
+    /// Mid exposure, seconds.
+    pub timestamp: f64,
+    /// Pose at shutter opening.
+    pub start: RigidTransform,
+    /// Pose at mid exposure.
+    pub mid: RigidTransform,
+    /// Pose at shutter closing.
+    pub end: RigidTransform,
+}
+
+/// Reads a TUM trajectory: lines `timestamp tx ty tz qx qy qz qw` with increasing timestamps.
+///
+/// # Errors
+///
+/// [`FileError`] if the file is unreadable, a line malformed, a number not finite, a quaternion further than
+/// [`QUATERNION_LENGTH_TOLERANCE`] from unit length, or timestamps are doubled or out of order.
+pub fn read_trajectory(path: &Path) -> Result<Vec<TimedPose>, FileError> {
+    read_lines(path, "timestamp tx ty tz qx qy qz qw", |line, numbers: [f64; 8]| {
+        let [timestamp, pose @ ..] = numbers;
+        Ok(TimedPose { timestamp, world_from_camera: pose_from_numbers(line, &pose)? })
+    })
+}
+
+/// Reads exposure lines: `timestamp`, then `tx ty tz qx qy qz qw` at opening, mid exposure and closing.
+///
+/// # Errors
+///
+/// As [`read_trajectory`].
+pub fn read_exposures(path: &Path) -> Result<Vec<TimedExposure>, FileError> {
+    let expected = "timestamp and three poses tx ty tz qx qy qz qw (22 numbers)";
+    read_lines(path, expected, |line, numbers: [f64; 22]| {
+        Ok(TimedExposure {
+            timestamp: numbers[0],
+            start: pose_from_numbers(line, &numbers[1..8])?,
+            mid: pose_from_numbers(line, &numbers[8..15])?,
+            end: pose_from_numbers(line, &numbers[15..22])?,
+        })
+    })
+}
+
+/// Writes a TUM trajectory, timestamps with six decimals and poses with nine. The file appears whole or not at
+/// all.
+///
+/// # Errors
+///
+/// [`FileError::Unwritable`].
+pub fn write_trajectory(path: &Path, poses: &[TimedPose]) -> Result<(), FileError> {
+    let mut text = String::from("# timestamp tx ty tz qx qy qz qw (camera-to-world at mid exposure)\n");
+    for pose in poses {
+        push_timestamp(&mut text, pose.timestamp);
+        push_pose(&mut text, &pose.world_from_camera);
+        text.push('\n');
+    }
+    write_whole(path, &text)
+}
+
+/// Writes exposure lines in the format of [`read_exposures`]; precision and atomicity as [`write_trajectory`].
+///
+/// # Errors
+///
+/// [`FileError::Unwritable`].
+pub fn write_exposures(path: &Path, exposures: &[TimedExposure]) -> Result<(), FileError> {
+    let mut text = String::from(
+        "# timestamp, then tx ty tz qx qy qz qw at exposure start, mid, end (camera-to-world)\n",
+    );
+    for exposure in exposures {
+        push_timestamp(&mut text, exposure.timestamp);
+        for pose in [&exposure.start, &exposure.mid, &exposure.end] {
+            push_pose(&mut text, pose);
+        }
+        text.push('\n');
+    }
+    write_whole(path, &text)
+}
+
+/// Parses every line into `N` numbers and a value; the first number is the timestamp.
+fn read_lines<const N: usize, T>(
+    path: &Path,
+    expected: &'static str,
+    parse: impl Fn(&Line<'_>, [f64; N]) -> Result<T, FileError>,
+) -> Result<Vec<T>, FileError> {
+    let file = TextFile::read(path)?;
+    let mut previous = None;
+    file.lines()
+        .map(|line| {
+            let numbers = line.numbers(expected)?;
+            line.check_order(numbers[0], previous)?;
+            previous = Some(numbers[0]);
+            parse(&line, numbers)
+        })
+        .collect()
+}
+
+/// The pose of the seven finite numbers `tx ty tz qx qy qz qw`.
+fn pose_from_numbers(line: &Line<'_>, numbers: &[f64]) -> Result<RigidTransform, FileError> {
+    let quaternion = Quaternion::new(numbers[6], numbers[3], numbers[4], numbers[5]);
+    let norm = quaternion.norm();
+    if (norm - 1.0).abs() > QUATERNION_LENGTH_TOLERANCE {
+        return Err(FileError::NotUnitQuaternion { path: line.path().to_owned(), line: line.number, norm });
+    }
+    let translation = Vector3::new(numbers[0], numbers[1], numbers[2]);
+    Ok(RigidTransform::new(UnitQuaternion::new_normalize(quaternion), translation))
+}
+
+fn push_timestamp(text: &mut String, timestamp: f64) {
+    // Writing to a string cannot fail.
+    let _ = write!(text, "{timestamp:.6}");
+}
+
+fn push_pose(text: &mut String, pose: &RigidTransform) {
+    for value in pose.translation.iter().chain(pose.rotation.coords.iter()) {
+        let _ = write!(text, " {value:.9}");
+    }
+}
+
+/// Writes beside the file and renames, so that a full disk never leaves half a file.
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {
+    let partial = path.with_added_extension("partial");
+    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|reason| {
+        // Only a left-over is lost if this fails too.
+        let _ = fs::remove_file(&partial);
+        FileError::Unwritable { path: path.to_owned(), reason }
+    })
+}

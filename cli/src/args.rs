@@ -20,6 +20,7 @@ pub struct Cli {
 
 /// Options of every command.
 #[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Options of every command")]
 pub struct Global {
     /// Print figures as JSON on stdout
     #[arg(long, global = true)]
@@ -38,9 +39,26 @@ pub struct Global {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Show what a data set holds, lacks and what is odd about it
+    Info(Info),
     /// Measure an estimate against a reference
     #[command(subcommand)]
     Eval(EvalCommand),
+}
+
+/// Arguments of `mba info`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+A data set is a folder in the layout of the TUM RGB-D benchmark: rgb.txt and depth.txt (or associations.txt), \
+the images, calibration.toml (not needed for freiburg1 to 3) and, optionally, groundtruth.txt, \
+groundtruth_exposure.txt and exposures.csv.
+
+Example:
+  mba info rgbd_dataset_freiburg1_rpy")]
+pub struct Info {
+    /// Folder of the data set
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
 }
 
 /// What to measure.

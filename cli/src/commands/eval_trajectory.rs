@@ -3,16 +3,21 @@
 use std::fs;
 use std::path::Path;
 
+use mba_mapper::dataset::survey;
 use mba_mapper::evaluation::{
-    BlurFigures, TrajectoryError, TrajectoryFigures, TrajectoryOptions, evaluate_trajectory,
+    BlurFigures, TrajectoryError, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
 };
 use mba_mapper::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
 use serde::Serialize;
 
+use super::open;
 use crate::args::EvalTrajectory;
 use crate::console::Console;
-use crate::failure::OrBadInput;
+use crate::failure::{OrBadInput, bad_input};
 use crate::report::table;
+
+/// Frames from which the median depth is taken.
+const SAMPLED_FRAMES: usize = 16;
 
 /// What is printed.
 #[derive(Serialize)]
@@ -34,7 +39,8 @@ pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
     let evaluation = evaluate_trajectory(&reference.trajectory, &estimate.trajectory, &options)
         .map_err(|error| (hint(&error), error))
         .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
-    let report = Report { trajectory: TrajectoryFigures::from(&evaluation), blur: None };
+    let blur = blur_figures(args, &reference, &estimate, console)?;
+    let report = Report { trajectory: TrajectoryFigures::from(&evaluation), blur };
     console.result(&report, |report| {
         let mut text = table::trajectory(&report.trajectory);
         if let Some(blur) = &report.blur {
@@ -42,6 +48,35 @@ pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
         }
         text
     })
+}
+
+/// The blur figures when both files have exposures and the data set is known.
+fn blur_figures(
+    args: &EvalTrajectory,
+    reference: &Poses,
+    estimate: &Poses,
+    console: &Console,
+) -> anyhow::Result<Option<BlurFigures>> {
+    let (reference, estimate, folder) = match (&reference.exposures, &estimate.exposures, &args.dataset) {
+        (Some(reference), Some(estimate), Some(folder)) => (reference, estimate, folder),
+        (Some(_), Some(_), None) => {
+            console.note("note: give --dataset to get the blur figures of these exposures too");
+            return Ok(None);
+        }
+        (_, _, Some(_)) => {
+            return Err(bad_input(
+                "--dataset is for exposures, but one of the files is a plain trajectory",
+                "leave --dataset out, or compare groundtruth_exposure.txt with exposures.txt",
+            ));
+        }
+        _ => return Ok(None),
+    };
+    let dataset = open::dataset(folder)?;
+    let depth = survey(&dataset, SAMPLED_FRAMES).median_depth.ok_or_else(|| {
+        bad_input(format!("{} has no depth at all", folder.display()), "leave --dataset out")
+    })?;
+    let camera = &dataset.calibration().camera;
+    Ok(Some(BlurFigures::from(&evaluate_blur(reference, estimate, args.max_dt, camera, depth))))
 }
 
 fn hint(error: &TrajectoryError) -> &'static str {

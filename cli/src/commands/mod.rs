@@ -1,3 +1,5 @@
 //! One file per command.
 
 pub mod eval_trajectory;
+pub mod info;
+pub mod open;

@@ -22,6 +22,7 @@ mod exposure_list;
 mod frame;
 mod known_cameras;
 mod sequence;
+mod survey;
 mod tum;
 
 use std::fs;
@@ -33,6 +34,7 @@ pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, Reado
 pub use error::{DatasetError, FrameError, Warning};
 pub use frame::RgbdFrame;
 pub use sequence::Dataset;
+pub use survey::{Survey, survey};
 
 /// How a data set is opened.
 #[derive(Clone, Copy, Debug, PartialEq)]

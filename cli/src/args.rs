@@ -41,6 +41,8 @@ pub struct Global {
 pub enum Command {
     /// Show what a data set holds, lacks and what is odd about it
     Info(Info),
+    /// Write report.html and charts into a RUN folder
+    Report(Report),
     /// Measure an estimate against a reference
     #[command(subcommand)]
     Eval(EvalCommand),
@@ -59,6 +61,22 @@ pub struct Info {
     /// Folder of the data set
     #[arg(value_name = "DATASET")]
     pub dataset: PathBuf,
+}
+
+/// Arguments of `mba report`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The report is one HTML file without network access: charts, figures and settings of the run.
+
+Example:
+  mba report run")]
+pub struct Report {
+    /// RUN folder that `mba track` wrote
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Data set with the ground truth, if it has moved since the run
+    #[arg(long, value_name = "DIR")]
+    pub dataset: Option<PathBuf>,
 }
 
 /// What to measure.

@@ -3,3 +3,4 @@
 pub mod eval_trajectory;
 pub mod info;
 pub mod open;
+pub mod report;

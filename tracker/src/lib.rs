@@ -19,7 +19,20 @@
 #[cfg(feature = "std")]
 extern crate std;
 
+pub mod align;
+pub mod error;
 pub mod geometry;
 pub mod image;
+pub mod keyframe;
 pub mod math;
+pub mod photometric;
+pub mod simd;
+pub mod surface;
+mod tracker;
 pub mod trajectory;
+pub mod transfer;
+pub mod workspace;
+
+/// Instruction sets that the kernels can run on; chosen once, at construction.
+pub use fearless_simd::Level as SimdLevel;
+pub use tracker::{Frame, FrameResult, FrameStatus, ReferenceMode, Tracker, TrackerConfig, workspace_len};

@@ -35,6 +35,13 @@ impl PinholeCamera {
         }
     }
 
+    /// The coordinate on pyramid level `to` of the point whose coordinate on level `from` is `x`.
+    #[inline]
+    #[must_use]
+    pub fn pixel_at_level(x: f32, from: usize, to: usize) -> f32 {
+        (x + 0.5) * (1u32 << from) as f32 / (1u32 << to) as f32 - 0.5
+    }
+
     /// The ray through pixel `(u, v)`, scaled to unit z.
     #[must_use]
     pub fn ray(&self, u: f64, v: f64) -> Vector3<f64> {

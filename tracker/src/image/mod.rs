@@ -1,8 +1,12 @@
-//! Pixels: what the tracker does to an image before it looks at poses.
+//! Images in the caller's memory: undistortion, views of input frames and linear-light pyramids.
 
+mod pyramid;
 mod undistort;
+mod view;
 
+pub use pyramid::{GreyLevel, GreyPyramid, MAX_LEVELS};
 pub use undistort::{
     BufferSizeError, NO_SOURCE, PixelRectangle, SourcePosition, fill_source_map, region_with_source,
     remap_bilinear, remap_nearest,
 };
+pub use view::{ColourView, DepthView, PixelFormat};

@@ -1,0 +1,3 @@
+//! Pixel transfer: every SIMD level against the scalar oracle, derivatives, and published reference values.
+
+mod levels;

@@ -1,0 +1,184 @@
+//! Depth term: the current depth map against the keyframe's surface at mid exposure.
+//!
+//! Depth is nearly free of motion blur and holds the mid pose; the photometric term gives the motion within the
+//! exposure. A point of the current map is carried into the keyframe and its inverse depth there compared with
+//! the keyframe's map. The normal of the surface enters through the slopes of the fitted planes, which makes this
+//! the point-to-plane distance in units in which the sensor's noise is uniform.
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+use super::scale::{SIGMA_PER_MEDIAN_ABSOLUTE, median};
+use crate::geometry::{PinholeCamera, RigidTransform};
+use crate::math::round_half_up_to_i32;
+use crate::surface::{InverseDepthMap, SurfacePlanes, spread_limit};
+use crate::transfer::huber;
+
+/// Inputs of the depth term.
+#[derive(Clone, Copy, Debug)]
+pub struct DepthProblem<'a> {
+    /// Current inverse depth.
+    pub current: &'a InverseDepthMap<'a>,
+    /// Inverse depth of the keyframe.
+    pub keyframe: &'a InverseDepthMap<'a>,
+    /// Surface planes of the keyframe.
+    pub planes: &'a SurfacePlanes<'a>,
+    /// Camera of the maps' pyramid level.
+    pub camera: PinholeCamera,
+    /// Step between the pixels of the current map that take part.
+    pub stride: usize,
+    /// Residuals beyond this many 1/m belong to another surface.
+    pub gate: f32,
+}
+
+/// One compared point.
+struct DepthSample {
+    /// Inverse depth of the moved point minus that of the keyframe's surface, 1/m.
+    residual: f32,
+    /// Derivative of the residual by the moved point.
+    normal: Vector3<f32>,
+    /// The point relative to the camera centre, in keyframe axes, metres.
+    arm: Vector3<f32>,
+}
+
+/// Sums of the depth term for the mid pose, tangent (translation, left rotation) in the keyframe.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthSums {
+    /// Robust cost in squared standard deviations.
+    pub cost: f64,
+    /// Number of compared points.
+    pub points: f64,
+    /// Gauss-Newton matrix.
+    pub hessian: Matrix6<f64>,
+    /// Gradient.
+    pub gradient: Vector6<f64>,
+}
+
+impl DepthProblem<'_> {
+    /// Robust standard deviation of the residuals at `keyframe_from_camera`, 1/m, and the number of points behind
+    /// it; `scratch` bounds the number of residuals that are looked at.
+    pub fn noise_scale(&self, keyframe_from_camera: &RigidTransform, scratch: &mut [f32]) -> (f32, usize) {
+        let mut count = 0;
+        let capacity = scratch.len();
+        self.for_each_sample(keyframe_from_camera, |sample| {
+            if count < capacity {
+                scratch[count] = sample.residual.abs();
+                count += 1;
+            }
+        });
+        (SIGMA_PER_MEDIAN_ABSOLUTE * median(&mut scratch[..count]), count)
+    }
+
+    /// Robust cost and normal equations at `keyframe_from_camera` (mid exposure) for residuals of standard
+    /// deviation `sigma`.
+    #[must_use]
+    pub fn linearise(&self, keyframe_from_camera: &RigidTransform, sigma: f32, delta: f32) -> DepthSums {
+        let mut sums =
+            DepthSums { cost: 0.0, points: 0.0, hessian: Matrix6::zeros(), gradient: Vector6::zeros() };
+        let inverse_sigma = 1.0 / sigma;
+        let mut row_sums = RowSums::default();
+        let mut in_block = 0;
+        self.for_each_sample(keyframe_from_camera, |sample| {
+            row_sums.add(&sample, inverse_sigma, delta);
+            in_block += 1;
+            if in_block == FLUSH_INTERVAL {
+                row_sums.flush(&mut sums);
+                in_block = 0;
+            }
+        });
+        row_sums.flush(&mut sums);
+        sums.hessian.fill_lower_triangle_with_upper_triangle();
+        sums
+    }
+
+    fn for_each_sample(&self, keyframe_from_camera: &RigidTransform, mut visit: impl FnMut(DepthSample)) {
+        let rotation = keyframe_from_camera.rotation_matrix().map(|x| x as f32);
+        let position = keyframe_from_camera.translation.map(|x| x as f32);
+        let (fx, fy) = (self.camera.fx as f32, self.camera.fy as f32);
+        let (cx, cy) = (self.camera.cx as f32, self.camera.cy as f32);
+        let (inverse_fx, inverse_fy) = (1.0 / fx, 1.0 / fy);
+        let width = self.current.width;
+        for v in (0..self.current.height).step_by(self.stride) {
+            let y = (v as f32 - cy) * inverse_fy;
+            let row_ray = rotation.column(1) * y + rotation.column(2);
+            for u in (0..width).step_by(self.stride) {
+                let rho = self.current.values[v * width + u];
+                if rho <= 0.0 {
+                    continue;
+                }
+                let x = (u as f32 - cx) * inverse_fx;
+                let arm = (row_ray + rotation.column(0) * x) * (1.0 / rho);
+                let point = arm + position;
+                if point.z < 0.05 {
+                    continue;
+                }
+                let inverse_z = 1.0 / point.z;
+                let (a, b) = (point.x * inverse_z, point.y * inverse_z);
+                let (ku, kv) = (fx * a + cx, fy * b + cy);
+                let Some(surface) = self.keyframe.sample(ku, kv) else { continue };
+                let residual = inverse_z - surface;
+                if residual.abs() >= self.gate {
+                    continue;
+                }
+                let index = round_half_up_to_i32(kv) as usize * width + round_half_up_to_i32(ku) as usize;
+                if self.planes.value[index] <= 0.0 {
+                    continue;
+                }
+                let su = self.planes.slope_u[index] * fx * inverse_z;
+                let sv = self.planes.slope_v[index] * fy * inverse_z;
+                let normal = Vector3::new(-su, -sv, su * a + sv * b - inverse_z * inverse_z);
+                visit(DepthSample { residual, normal, arm });
+            }
+        }
+    }
+}
+
+/// Single-precision sums are moved to double precision after this many points.
+const FLUSH_INTERVAL: usize = 64;
+
+/// Sums of a short run of points in single precision.
+#[derive(Default)]
+struct RowSums {
+    cost: f32,
+    points: f32,
+    gradient: [f32; 6],
+    hessian: [[f32; 6]; 6],
+}
+
+impl RowSums {
+    #[inline]
+    fn add(&mut self, sample: &DepthSample, inverse_sigma: f32, delta: f32) {
+        let residual = sample.residual * inverse_sigma;
+        let (cost, weight) = huber(residual, delta);
+        self.cost += cost;
+        self.points += 1.0;
+        let normal = sample.normal * inverse_sigma;
+        let turn = sample.arm.cross(&normal);
+        let row = [normal.x, normal.y, normal.z, turn.x, turn.y, turn.z];
+        for i in 0..6 {
+            let weighted = weight * row[i];
+            self.gradient[i] += weighted * residual;
+            for j in i..6 {
+                self.hessian[i][j] += weighted * row[j];
+            }
+        }
+    }
+
+    fn flush(&mut self, sums: &mut DepthSums) {
+        sums.cost += f64::from(self.cost);
+        sums.points += f64::from(self.points);
+        for i in 0..6 {
+            sums.gradient[i] += f64::from(self.gradient[i]);
+            for j in i..6 {
+                sums.hessian[(i, j)] += f64::from(self.hessian[i][j]);
+            }
+        }
+        *self = Self::default();
+    }
+}
+
+/// Gate for a robust scale `sigma` around inverse depth of the scene: several deviations, but no farther than
+/// another surface would be.
+#[must_use]
+pub fn gate_for(sigma: f32) -> f32 {
+    (6.0 * sigma).clamp(0.012, 2.0 * spread_limit(0.3))
+}

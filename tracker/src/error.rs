@@ -1,0 +1,86 @@
+//! Errors of the tracker's interface.
+
+use core::fmt;
+
+use crate::workspace::WorkspaceError;
+
+/// Why a frame cannot be used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FrameError {
+    /// A buffer is too short for its size and stride.
+    Buffer {
+        /// Values needed.
+        needed: usize,
+        /// Values present.
+        got: usize,
+    },
+    /// An image does not have the size of the configuration.
+    Size {
+        /// Configured columns and rows.
+        expected: (usize, usize),
+        /// Columns and rows of the image.
+        got: (usize, usize),
+    },
+    /// The timestamp is not finite or not after that of the frame before.
+    Timestamp {
+        /// Timestamp of the frame before, seconds.
+        previous: f64,
+        /// Timestamp of this frame, seconds.
+        got: f64,
+    },
+    /// The exposure time is negative or not finite.
+    Exposure {
+        /// Exposure in seconds.
+        got: f64,
+    },
+}
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Buffer { needed, got } => write!(f, "image buffer holds {got} values, {needed} are needed"),
+            Self::Size { expected, got } => {
+                write!(f, "image is {}x{}, the calibration says {}x{}", got.0, got.1, expected.0, expected.1)
+            }
+            Self::Timestamp { previous, got } => {
+                write!(f, "timestamp {got:.6} s does not follow {previous:.6} s")
+            }
+            Self::Exposure { got } => write!(f, "exposure of {got} s is not a duration"),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+/// Why a tracker cannot be built.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ConfigError {
+    /// A setting is outside its range.
+    Setting {
+        /// Name of the setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// The range it must lie in.
+        expected: &'static str,
+    },
+    /// The caller's memory cannot be used.
+    Workspace(WorkspaceError),
+}
+
+impl fmt::Display for ConfigError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Setting { name, value, expected } => write!(f, "{name} = {value}: expected {expected}"),
+            Self::Workspace(error) => error.fmt(f),
+        }
+    }
+}
+
+impl core::error::Error for ConfigError {}
+
+impl From<WorkspaceError> for ConfigError {
+    fn from(error: WorkspaceError) -> Self {
+        Self::Workspace(error)
+    }
+}

@@ -1,0 +1,7 @@
+//! Keyframes: the sharp reference that frames are aligned with.
+
+mod frame;
+mod select;
+
+pub use frame::{Keyframe, MAX_KEYPOINTS};
+pub use select::{Keypoint, SelectionSettings, select_keypoints};

@@ -1,0 +1,11 @@
+//! Depth maps at the resolution where their noise is spread over a few pixels: block means of inverse depth, and
+//! the local planes of a keyframe's surface.
+//!
+//! Everything is in inverse depth because the noise of disparity-based sensors is uniform there, and because a
+//! plane's inverse depth is linear in the image.
+
+mod block_mean;
+mod planes;
+
+pub use block_mean::{InverseDepthMap, spread_limit};
+pub use planes::SurfacePlanes;

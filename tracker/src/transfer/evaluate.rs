@@ -1,0 +1,193 @@
+//! The photometric term of one pyramid level: robust cost and normal equations over all patches.
+
+use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, Simd, dispatch};
+use nalgebra::{SMatrix, SVector};
+
+use super::accumulate::{NormalEquations, Whitening};
+use super::kernel::TransferKernel;
+use super::problem::{PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem};
+
+/// How residuals are weighted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ResidualModel {
+    /// Variance of an intensity that does not depend on the signal (linear light squared).
+    pub read_variance: f32,
+    /// Variance per unit of intensity (photon noise), linear light.
+    pub photon_variance: f32,
+    /// Huber threshold in standard deviations.
+    pub huber: f32,
+}
+
+/// Outcome of one patch.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct PatchCost {
+    /// Sum of the robust cost over the valid pixels, in squared standard deviations.
+    pub cost: f32,
+    /// Number of valid pixels.
+    pub pixels: f32,
+}
+
+/// Sums over all patches: `cost = sum rho(r)`, `hessian = sum w J^T J`, `gradient = sum w r J^T`, columns in the
+/// order of [`ROW_LENGTH`], left rotations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotometricSums {
+    /// Robust cost.
+    pub cost: f64,
+    /// Number of valid pixels.
+    pub pixels: f64,
+    /// Gauss-Newton matrix.
+    pub hessian: SMatrix<f64, ROW_LENGTH, ROW_LENGTH>,
+    /// Gradient.
+    pub gradient: SVector<f64, ROW_LENGTH>,
+}
+
+impl Default for PhotometricSums {
+    fn default() -> Self {
+        Self { cost: 0.0, pixels: 0.0, hessian: SMatrix::zeros(), gradient: SVector::zeros() }
+    }
+}
+
+/// Robust cost of every patch; `patches` has the length of `sites`. Returns the sums over all patches.
+///
+/// `level` is the instruction set to use; results differ between levels by rounding only. A pixel whose
+/// prediction, observation or variance is not finite does not count.
+pub fn evaluate_cost(
+    level: Level,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PatchCost {
+    dispatch!(level, simd => cost_of_patches(simd, problem, sites, model, patches))
+}
+
+/// Normal equations and robust cost of all patches; see [`evaluate_cost`].
+pub fn linearize(
+    level: Level,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    dispatch!(level, simd => sums_of_patches(simd, problem, sites, model, patches))
+}
+
+/// Predicted intensities of every patch; `out` has the length of `sites`.
+pub fn transfer_values(
+    level: Level,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    out: &mut [PatchValues],
+) {
+    dispatch!(level, simd => values_of_patches(simd, problem, sites, out));
+}
+
+/// Predicted intensities of every patch and their derivatives; `out` has the length of `sites`.
+pub fn transfer_rows(level: Level, problem: &TransferProblem, sites: &[PatchSite], out: &mut [PatchRows]) {
+    dispatch!(level, simd => rows_of_patches(simd, problem, sites, out));
+}
+
+/// The part of [`linearize`] that follows [`transfer_rows`]: `rows` and `patches` have the length of `sites`.
+pub fn accumulate_rows(
+    level: Level,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    rows: &[PatchRows],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    dispatch!(level, simd => sums_of_rows(simd, problem, sites, rows, model, patches))
+}
+
+#[inline(always)]
+fn cost_of_patches<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PatchCost {
+    patches.fill(PatchCost::default());
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return PatchCost::default() };
+    let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+    let mut values = PatchValues::default();
+    let (mut cost, mut pixels) = (0.0, 0.0);
+    for (site, patch) in sites.iter().zip(patches) {
+        kernel.patch_values(site, &mut values);
+        *patch = whitening.cost(site, &values);
+        cost += f64::from(patch.cost);
+        pixels += f64::from(patch.pixels);
+    }
+    PatchCost { cost: cost as f32, pixels: pixels as f32 }
+}
+
+#[inline(always)]
+fn sums_of_patches<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    patches.fill(PatchCost::default());
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return PhotometricSums::default() };
+    let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+    let mut rows = PatchRows::default();
+    let mut sums = NormalEquations::new(simd);
+    for (site, patch) in sites.iter().zip(patches) {
+        kernel.patch_rows(site, &mut rows);
+        *patch = sums.add(&whitening, site, &rows);
+    }
+    sums.finish()
+}
+
+#[inline(always)]
+fn values_of_patches<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    out: &mut [PatchValues],
+) {
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchValues::default()) };
+    for (site, values) in sites.iter().zip(out) {
+        kernel.patch_values(site, values);
+    }
+}
+
+#[inline(always)]
+fn rows_of_patches<S: Simd>(simd: S, problem: &TransferProblem, sites: &[PatchSite], out: &mut [PatchRows]) {
+    let Some(kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchRows::default()) };
+    for (site, rows) in sites.iter().zip(out) {
+        kernel.patch_rows(site, rows);
+    }
+}
+
+#[inline(always)]
+fn sums_of_rows<S: Simd>(
+    simd: S,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    rows: &[PatchRows],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> PhotometricSums {
+    let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+    let mut sums = NormalEquations::new(simd);
+    for ((site, rows), patch) in sites.iter().zip(rows).zip(patches) {
+        *patch = sums.add(&whitening, site, rows);
+    }
+    sums.finish()
+}
+
+/// Huber cost `rho(r)` and weight `rho'(r)/r` with threshold `delta`.
+#[must_use]
+pub fn huber(r: f32, delta: f32) -> (f32, f32) {
+    let magnitude = r.abs();
+    if magnitude <= delta {
+        (0.5 * r * r, 1.0)
+    } else {
+        (delta * magnitude - 0.5 * delta * delta, delta / magnitude)
+    }
+}

@@ -1,0 +1,26 @@
+//! Pixel transfer through the fronto-parallel plane of a keypoint, and the blurred patch it predicts.
+//!
+//! A pixel of a virtual view is mapped into the sharp reference image through the plane `z = d` on which its
+//! keypoint lies; the mean of the reference intensities over all virtual views of an exposure is the intensity
+//! the blurred frame should show (MBA-VO and MBA-SLAM, with the corrections stated at each formula).
+
+mod accumulate;
+mod bilinear;
+mod evaluate;
+mod kernel;
+mod pattern;
+mod pixel;
+mod problem;
+pub mod reference;
+mod virtual_view;
+
+pub use evaluate::{
+    PatchCost, PhotometricSums, ResidualModel, accumulate_rows, evaluate_cost, huber, linearize,
+    transfer_rows, transfer_values,
+};
+pub use pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
+pub use pixel::{TransferredPixel, transfer_pixel};
+pub use problem::{
+    BrightnessModel, LevelImage, PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem,
+};
+pub use virtual_view::{MAX_VIRTUAL_VIEWS, VirtualView, virtual_views};

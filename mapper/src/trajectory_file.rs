@@ -155,3 +155,115 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {
         FileError::Unwritable { path: path.to_owned(), reason }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(text: &str) -> String {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), text).unwrap();
+        let message = read_trajectory(file.path()).unwrap_err().to_string();
+        message.replace(&file.path().display().to_string(), "FILE")
+    }
+
+    fn sample_pose(angle: f64) -> RigidTransform {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.3, -angle, 0.2));
+        RigidTransform::new(rotation, Vector3::new(1.25, -angle, 1e-3))
+    }
+
+    #[test]
+    fn columns_are_translation_then_quaternion_with_w_last() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let half = 0.5_f64.sqrt();
+        let text =
+            format!("# comment\n\n  1305031229.0333\t1 2 3 0 0 {half} {half}\n1305031230,4,5,6,0,0,0,-1\n");
+        fs::write(file.path(), text).unwrap();
+        let poses = read_trajectory(file.path()).unwrap();
+        assert_eq!(poses.len(), 2);
+        assert_eq!(poses[0].timestamp, 1305031229.0333);
+        // A quarter turn about z takes x to y.
+        let image = poses[0].world_from_camera.transform_point(&Vector3::x());
+        assert!((image - Vector3::new(1.0, 3.0, 3.0)).norm() < 1e-12);
+        assert!(poses[1].world_from_camera.rotation.angle() < 1e-12);
+    }
+
+    #[test]
+    fn rounded_quaternions_are_normalised() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), "0 0 0 0 0.6853 0.5405 -0.0074 -0.4921\n").unwrap();
+        let pose = read_trajectory(file.path()).unwrap()[0].world_from_camera;
+        assert!((pose.rotation.coords.norm() - 1.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn written_files_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("trajectory.txt");
+        let poses = [0.1, 0.7].map(|t| TimedPose { timestamp: 1e9 + t, world_from_camera: sample_pose(t) });
+        write_trajectory(&path, &poses).unwrap();
+        for (read, written) in read_trajectory(&path).unwrap().iter().zip(&poses) {
+            assert!((read.timestamp - written.timestamp).abs() < 1e-6);
+            assert!(read.world_from_camera.tangent_to(&written.world_from_camera).norm() < 4e-9);
+        }
+
+        let exposures = [TimedExposure {
+            timestamp: 0.1,
+            start: sample_pose(0.1),
+            mid: sample_pose(0.2),
+            end: sample_pose(0.3),
+        }];
+        write_exposures(&path, &exposures).unwrap();
+        let read = read_exposures(&path).unwrap()[0];
+        assert_eq!(read.timestamp, 0.1);
+        for (read, written) in [(read.start, 0.1), (read.mid, 0.2), (read.end, 0.3)] {
+            assert!(read.tangent_to(&sample_pose(written)).norm() < 4e-9);
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no partial file is left");
+    }
+
+    #[test]
+    fn messages_name_file_line_and_value() {
+        assert_eq!(
+            message("# c\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 1\n"),
+            "FILE, line 3: expected timestamp tx ty tz qx qy qz qw, found \"2 0 0 0 0 0 1\""
+        );
+        assert_eq!(
+            message("1 0 0 x 0 0 0 1"),
+            "FILE, line 1: expected timestamp tx ty tz qx qy qz qw, found \"1 0 0 x 0 0 0 1\""
+        );
+        assert_eq!(message("1 0 nan 0 0 0 0 1"), "FILE, line 1: nan is not a finite number");
+        assert_eq!(
+            message("1 0 0 0 0 0 0.5 0.5"),
+            "FILE, line 1: the quaternion has length 0.7071, expected 1; \
+             the order of a pose is tx ty tz qx qy qz qw"
+        );
+        assert_eq!(
+            message("2 0 0 0 0 0 0 1\n\n1.5 0 0 0 0 0 0 1"),
+            "FILE, line 3: timestamp 1.5 comes after 2; sort the lines by time, \
+             or move the file away if it is not needed"
+        );
+        assert_eq!(
+            message("1305031229.5 0 0 0 0 0 0 1\n1305031229.50 0 0 0 0 0 0 1"),
+            "FILE, line 2: timestamp 1305031229.5 occurs twice; remove one of the lines"
+        );
+    }
+
+    #[test]
+    fn exposure_lines_have_22_numbers() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        fs::write(file.path(), "1 0 0 0 0 0 0 1\n").unwrap();
+        let message = read_exposures(file.path()).unwrap_err().to_string();
+        assert!(message.contains("line 1: expected timestamp and three poses"), "{message}");
+    }
+
+    #[test]
+    fn files_that_cannot_be_read_or_written_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("missing/trajectory.txt");
+        let read = read_trajectory(&path).unwrap_err().to_string();
+        assert!(read.starts_with(&format!("cannot read {}: ", path.display())), "{read}");
+        let written = write_trajectory(&path, &[]).unwrap_err().to_string();
+        assert!(written.starts_with(&format!("cannot write {}: ", path.display())), "{written}");
+    }
+}

@@ -20,6 +20,7 @@
 extern crate std;
 
 pub mod align;
+pub mod deblur;
 pub mod error;
 pub mod geometry;
 pub mod image;

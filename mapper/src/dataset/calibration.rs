@@ -1,6 +1,7 @@
 //! What has to be known about the camera, and checks that it makes sense.
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
+use mba_tracker::photometric::InverseResponse;
 
 /// Everything known about the camera of a data set.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,8 +52,20 @@ pub enum Response {
     Srgb,
     /// Proportional to light.
     Linear,
-    /// Linear light, in `[0, 1]` and not decreasing, for each of the 256 codes.
-    Table(Box<[f32; 256]>),
+    /// Measured.
+    Table(Box<InverseResponse>),
+}
+
+impl Response {
+    /// Linear light of each stored value, as the tracker wants it.
+    #[must_use]
+    pub fn inverse(&self) -> InverseResponse {
+        match self {
+            Self::Srgb => InverseResponse::srgb(),
+            Self::Linear => InverseResponse::linear(),
+            Self::Table(table) => table.as_ref().clone(),
+        }
+    }
 }
 
 /// How the sensor is read out.
@@ -76,7 +89,7 @@ pub(super) struct InvalidValue {
 const MAX_FOCAL_IN_WIDTHS: f64 = 100.0;
 
 /// Largest plausible image side in pixels, so that absurd sizes do not ask for absurd memory.
-const MAX_SIDE: usize = 32_768;
+const MAX_SIDE: usize = 16_384;
 
 impl Calibration {
     /// Exposure time of a frame that has none of its own, seconds.
@@ -109,7 +122,7 @@ impl Calibration {
 pub(super) fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
     for (key, side) in [("width", camera.width), ("height", camera.height)] {
         if side == 0 || side > MAX_SIDE {
-            return Err(invalid(key, side, "a size from 1 to 32768 pixels"));
+            return Err(invalid(key, side, "a size from 1 to 16384 pixels"));
         }
     }
     let (width, height) = (camera.width as f64, camera.height as f64);

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
+use mba_tracker::photometric::InverseResponse;
 use serde::Deserialize;
 
 use super::calibration::{ASSUMED_EXPOSURE_SHARE, InvalidValue};
@@ -44,7 +45,7 @@ enum ReadoutKey {
 /// `frame_rate`; whatever is assumed is added to `warnings`.
 ///
 /// `response` is `"srgb"`, `"linear"` or the name of a `.csv` or `.txt` file beside the calibration with 256
-/// numbers: the linear light of each code, in any unit.
+/// increasing numbers: the linear light of each code, in any unit.
 pub(super) fn read(
     path: &Path,
     measured_rate: Option<f64>,
@@ -146,34 +147,30 @@ fn response(
     }
 }
 
-/// Reads 256 numbers, separated by white space, commas or line ends, and scales the last to 1.
+/// Reads 256 increasing numbers, separated by white space, commas or line ends, and scales the last to 1.
 fn read_response_table(path: &Path) -> Result<Response, FileError> {
-    const EXPECTED: &str =
-        "256 numbers of linear light for the codes 0 to 255, not negative and not decreasing";
+    const EXPECTED: &str = "256 increasing numbers, not negative: the linear light of the codes 0 to 255";
     let file = TextFile::read(path)?;
-    let mut values = Vec::with_capacity(256);
-    let mut last = None;
+    let mut values: Vec<f32> = Vec::with_capacity(256);
+    let mut last_line = 1;
     for line in file.lines() {
         for field in line.fields() {
-            let value = line.number(field, EXPECTED)?;
-            if value < values.last().copied().unwrap_or(0.0) || values.len() == 256 {
+            let value = line.number(field, EXPECTED)? as f32;
+            let increases = values.last().is_none_or(|previous| value > *previous);
+            if !increases || value < 0.0 || values.len() == 256 {
                 return Err(line.malformed(EXPECTED));
             }
             values.push(value);
         }
-        last = Some(line);
+        last_line = line.number;
     }
-    let scale = values.last().copied().unwrap_or(0.0);
-    let table: Vec<f32> = values.iter().map(|value| (value / scale) as f32).collect();
-    match <Box<[f32; 256]>>::try_from(table.into_boxed_slice()) {
-        Ok(table) if scale > 0.0 => Ok(Response::Table(table)),
-        _ => Err(FileError::MalformedLine {
-            path: path.to_owned(),
-            line: last.map_or(1, |line| line.number),
-            found: format!("{} numbers, the last {scale}", values.len()),
-            expected: EXPECTED,
-        }),
-    }
+    let table = values.as_slice().try_into().ok().and_then(InverseResponse::from_table);
+    table.map(|table| Response::Table(Box::new(table))).ok_or_else(|| FileError::MalformedLine {
+        path: path.to_owned(),
+        line: last_line,
+        found: format!("{} numbers", values.len()),
+        expected: EXPECTED,
+    })
 }
 
 /// Line, from 1, in which `span` begins.

@@ -25,14 +25,12 @@ pub enum DatasetError {
     },
     /// There is neither a calibration file nor a known camera.
     #[error(
-        "{folder} has no {file} and its name is not that of a known camera (freiburg1, freiburg2, freiburg3); \
-         add that file with the camera's width, height, fx, fy, cx, cy and depth_scale"
+        "{folder} has no calibration.toml and its name is not that of a known camera (freiburg1, freiburg2, \
+         freiburg3); add that file with the camera's width, height, fx, fy, cx, cy and depth_scale"
     )]
     MissingCalibration {
         /// The folder.
         folder: PathBuf,
-        /// Name of the expected file.
-        file: &'static str,
     },
     /// The calibration file is not valid, lacks a key or has an unknown one.
     #[error("{path}, line {line}: {message}")]
@@ -158,6 +156,16 @@ pub enum Warning {
         first: f64,
         /// Accepted time difference, seconds.
         tolerance: f64,
+    },
+    /// Numbered images without a partner of the same number were left out.
+    #[error("{folder}: {count} images have no partner of the same number and are left out, first {first}")]
+    Unpaired {
+        /// Folder of the images.
+        folder: PathBuf,
+        /// Number of images left out.
+        count: usize,
+        /// The first of them.
+        first: PathBuf,
     },
     /// An association pairs images that are far apart in time.
     #[error("{list}: {count} pairs are more than {tolerance} s apart, up to {largest:.6} s")]

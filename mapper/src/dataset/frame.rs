@@ -64,7 +64,11 @@ fn decode(
     size: (usize, usize),
     check: impl Fn(ColorType) -> Result<(), FrameError>,
 ) -> Result<DynamicImage, FrameError> {
-    let damaged = |reason: String| FrameError::Damaged { path: path.to_owned(), reason };
+    let damaged = |reason: String| {
+        // Some decoders break their messages into lines.
+        let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
+        FrameError::Damaged { path: path.to_owned(), reason }
+    };
     let bytes = fs::read(path).map_err(|reason| FrameError::Unreadable { path: path.to_owned(), reason })?;
     let reader = ImageReader::new(Cursor::new(&bytes))
         .with_guessed_format()

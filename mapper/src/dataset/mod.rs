@@ -1,7 +1,8 @@
 //! Recorded RGB-D sequences: which layout a folder has, what its camera is, and its frames one by one.
 //!
-//! The native layout is that of the TUM RGB-D benchmark plus a `calibration.toml`. Timestamps are those of mid
-//! exposure; poses are `world_from_camera`.
+//! The native layout is that of the TUM RGB-D benchmark plus a `calibration.toml`; the sequences of that
+//! benchmark, Replica as rendered for NICE-SLAM and ScanNet exports are read as they are. Timestamps are those of
+//! mid exposure; poses are `world_from_camera`.
 //!
 //! ```no_run
 //! let dataset = mba_mapper::dataset::open(std::path::Path::new("my_sequence"))?;
@@ -21,6 +22,10 @@ mod error;
 mod exposure_list;
 mod frame;
 mod known_cameras;
+mod numbered_images;
+mod pose_matrix;
+mod replica;
+mod scannet;
 mod sequence;
 mod survey;
 mod tum;
@@ -69,6 +74,10 @@ pub fn open_with(folder: &Path, options: &OpenOptions) -> Result<Dataset, Datase
     fs::read_dir(folder).map_err(|reason| FileError::Unreadable { path: folder.to_owned(), reason })?;
     let contents = if tum::recognise(folder) {
         tum::read(folder, options)?
+    } else if replica::recognise(folder) {
+        replica::read(folder)?
+    } else if scannet::recognise(folder) {
+        scannet::read(folder)?
     } else {
         return Err(DatasetError::UnknownLayout { folder: folder.to_owned() });
     };

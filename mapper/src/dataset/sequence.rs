@@ -62,7 +62,11 @@ impl Dataset {
         let Contents { calibration, colour_camera, entries, ground_truth, ground_truth_exposures, warnings } =
             contents;
         let camera = calibration.camera;
-        let colour = ImageSource::new(&calibration, &colour_camera.unwrap_or(camera));
+        let colour_camera = colour_camera.unwrap_or(camera);
+        // Before the maps: their memory follows from sizes that may be wrong.
+        check_first_size(entries.iter().map(|entry| &entry.colour), size(&colour_camera))?;
+        check_first_size(entries.iter().map(|entry| &entry.depth), size(&camera))?;
+        let colour = ImageSource::new(&calibration, &colour_camera);
         let depth = ImageSource::new(&calibration, &camera);
         let whole = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
         let region = colour.map.as_ref().map_or(whole, |map| region_with_source(map, camera.width));
@@ -80,7 +84,6 @@ impl Dataset {
             depth,
             region,
         };
-        dataset.check_first_sizes()?;
         dataset.warn_about_timing();
         dataset.warn_about_missing_images();
         Ok(dataset)
@@ -191,15 +194,6 @@ impl Dataset {
         entry.exposure_seconds.unwrap_or(self.calibration.fallback_exposure_seconds())
     }
 
-    /// Compares the first readable image of each kind with the calibration, so that a wrong calibration is
-    /// found before any work.
-    fn check_first_sizes(&self) -> Result<(), DatasetError> {
-        let colour = self.entries.iter().map(|entry| &entry.colour);
-        let depth = self.entries.iter().map(|entry| &entry.depth);
-        check_first_size(colour, self.colour.size)?;
-        check_first_size(depth, self.depth.size)
-    }
-
     fn warn_about_timing(&mut self) {
         let frame_rate = self.calibration.frame_rate;
         let interval = 1.0 / frame_rate;
@@ -232,7 +226,7 @@ impl Dataset {
 impl ImageSource {
     fn new(calibration: &Calibration, captured: &PinholeCamera) -> Self {
         let ideal = &calibration.camera;
-        let size = (captured.width, captured.height);
+        let size = size(captured);
         if calibration.distortion.is_none() && captured == ideal {
             return Self { size, map: None };
         }
@@ -278,6 +272,11 @@ fn find_gaps(times: &[f64]) -> Option<Warning> {
     Some(Warning::Gaps { count: gaps.count(), longest, after })
 }
 
+fn size(camera: &PinholeCamera) -> (usize, usize) {
+    (camera.width, camera.height)
+}
+
+/// Compares the first readable image with the calibration, so that a wrong calibration is found before any work.
 fn check_first_size<'a>(
     mut paths: impl Iterator<Item = &'a PathBuf>,
     expected: (usize, usize),

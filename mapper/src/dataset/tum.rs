@@ -184,10 +184,8 @@ fn read_calibration(
         return calibration_file::read(&path, frames_per_second(&times), warnings);
     }
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let known = tum_camera(&absolute).ok_or_else(|| DatasetError::MissingCalibration {
-        folder: folder.to_owned(),
-        file: calibration_file::FILE_NAME,
-    })?;
+    let known = tum_camera(&absolute)
+        .ok_or_else(|| DatasetError::MissingCalibration { folder: folder.to_owned() })?;
     warnings.push(Warning::KnownCamera { camera: known.name });
     Ok(Calibration {
         camera: known.camera,

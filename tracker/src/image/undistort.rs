@@ -241,3 +241,138 @@ fn monotone_radius_squared(distortion: &Distortion, r2_max: f64) -> f64 {
         .find(|r2| slope(*r2) <= 0.0)
         .map_or(f64::INFINITY, |r2| r2 - step)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: PinholeCamera = PinholeCamera {
+        width: 640,
+        height: 480,
+        fx: 517.306408,
+        fy: 516.469215,
+        cx: 318.643040,
+        cy: 255.313989,
+    };
+    const LENS: Distortion =
+        Distortion { k1: 0.262383, k2: -0.953104, p1: -0.005358, p2: 0.002628, k3: 1.163314 };
+    const PIXELS: usize = CAMERA.width * CAMERA.height;
+
+    fn lens_map() -> std::vec::Vec<SourcePosition> {
+        let mut map = std::vec![[0.0; 2]; PIXELS];
+        fill_source_map(&CAMERA, &CAMERA, &LENS, &mut map).unwrap();
+        map
+    }
+
+    /// The ideal pixel of a position in the captured image, by iterating the lens equation.
+    fn undistorted([u, v]: SourcePosition) -> [f64; 2] {
+        let (xd, yd) = ((f64::from(u) - CAMERA.cx) / CAMERA.fx, (f64::from(v) - CAMERA.cy) / CAMERA.fy);
+        let (mut x, mut y) = (xd, yd);
+        for _ in 0..200 {
+            let (xs, ys) = LENS.distort(x, y);
+            (x, y) = (x + 0.7 * (xd - xs), y + 0.7 * (yd - ys));
+        }
+        [CAMERA.fx * x + CAMERA.cx, CAMERA.fy * y + CAMERA.cy]
+    }
+
+    #[test]
+    fn map_agrees_with_the_lens_model_written_out() {
+        let map = lens_map();
+        for (column, row) in [(30, 40), (320, 240), (600, 100), (50, 420), (500, 450)] {
+            let x = (column as f64 - 318.643040) / 517.306408;
+            let y = (row as f64 - 255.313989) / 516.469215;
+            let r2 = x.powi(2) + y.powi(2);
+            let radial = 1.0 + 0.262383 * r2 - 0.953104 * r2.powi(2) + 1.163314 * r2.powi(3);
+            let xd = x * radial - 2.0 * 0.005358 * x * y + 0.002628 * (r2 + 2.0 * x.powi(2));
+            let yd = y * radial - 0.005358 * (r2 + 2.0 * y.powi(2)) + 2.0 * 0.002628 * x * y;
+            let [u, v] = map[row * CAMERA.width + column];
+            assert!((f64::from(u) - (xd * 517.306408 + 318.643040)).abs() < 1e-4, "column {column}");
+            assert!((f64::from(v) - (yd * 516.469215 + 255.313989)).abs() < 1e-4, "row {row}");
+        }
+    }
+
+    #[test]
+    fn map_and_iterated_inverse_return_to_the_ideal_pixel() {
+        let map = lens_map();
+        let mut checked = 0;
+        for index in (0..PIXELS).step_by(997).filter(|index| map[*index] != NO_SOURCE) {
+            let [u, v] = undistorted(map[index]);
+            assert!((u - (index % CAMERA.width) as f64).abs() < 1e-3, "pixel {index}: {u}");
+            assert!((v - (index / CAMERA.width) as f64).abs() < 1e-3, "pixel {index}: {v}");
+            checked += 1;
+        }
+        assert!(checked > 250, "{checked}");
+    }
+
+    #[test]
+    fn region_holds_no_pixel_without_source_and_most_of_the_image() {
+        let map = lens_map();
+        let PixelRectangle { left, top, right, bottom } = region_with_source(&map, CAMERA.width);
+        assert!((top..bottom).all(|row| (left..right).all(|c| map[row * CAMERA.width + c] != NO_SOURCE)));
+        assert!((right - left) * (bottom - top) > PIXELS * 88 / 100);
+        assert!(map[0] == NO_SOURCE, "the corner of this lens is outside the captured image");
+    }
+
+    #[test]
+    fn region_cuts_the_worst_side_first() {
+        let (o, x) = ([1.0, 1.0], NO_SOURCE);
+        // All of the first row is missing; then one pixel of three in the first column against one of five in
+        // the last row.
+        let map = [x, x, x, x, x, o, o, o, o, o, o, o, o, o, o, x, o, o, o, o];
+        let expected = PixelRectangle { left: 1, top: 1, right: 5, bottom: 4 };
+        assert_eq!(region_with_source(&map, 5), expected);
+        assert_eq!(region_with_source(&[], 0), PixelRectangle { left: 0, top: 0, right: 0, bottom: 0 });
+        let nothing = region_with_source(&[x; 4], 2);
+        assert!(nothing.left == nothing.right || nothing.top == nothing.bottom);
+    }
+
+    #[test]
+    fn bilinear_is_exact_on_a_ramp_and_black_without_source() {
+        let source: [[u8; 2]; 12] = core::array::from_fn(|i| [(10 * (i % 4)) as u8, (20 * (i / 4)) as u8]);
+        let map = [[0.26, 1.5], [3.0, 2.0], [2.74, 0.0], [3.01, 1.0], [f32::NAN, 1.0], NO_SOURCE];
+        let mut target = [[9; 2]; 6];
+        remap_bilinear(&source, 4, 3, &map, &mut target).unwrap();
+        assert_eq!(target, [[3, 30], [30, 40], [27, 0], [0, 0], [0, 0], [0, 0]]);
+    }
+
+    #[test]
+    fn depth_takes_the_nearest_pixel_and_never_a_mixture() {
+        let source = [1000, 5000, 0, 7000];
+        let map = [[0.49, 0.0], [0.5, 0.0], [0.3, 0.9], [1.0, 1.0], [-0.1, 0.0]];
+        let mut target = [1; 5];
+        remap_nearest(&source, 2, 2, &map, &mut target).unwrap();
+        assert_eq!(target, [1000, 5000, 0, 7000, 0]);
+    }
+
+    #[test]
+    fn another_camera_rescales() {
+        let captured = CAMERA;
+        let ideal = CAMERA.at_level(1);
+        let mut map = std::vec![[0.0; 2]; ideal.width * ideal.height];
+        fill_source_map(&ideal, &captured, &Distortion::default(), &mut map).unwrap();
+        // The centre of a coarse pixel lies between two fine ones.
+        let [u, v] = map[100 * ideal.width + 7];
+        assert!((u - 14.5).abs() < 1e-4 && (v - 200.5).abs() < 1e-4, "{u} {v}");
+    }
+
+    #[test]
+    fn beyond_the_fold_of_the_lens_there_is_no_source() {
+        // r (1 - 0.4 r^2) stops growing at r^2 = 1/1.2.
+        let lens = Distortion { k1: -0.4, ..Distortion::default() };
+        let camera = PinholeCamera { width: 201, height: 1, fx: 50.0, fy: 50.0, cx: 100.0, cy: 0.0 };
+        let mut map = [[0.0; 2]; 201];
+        fill_source_map(&camera, &camera, &lens, &mut map).unwrap();
+        assert!(map[100 + 45] != NO_SOURCE, "r = 0.90");
+        assert!(map[100 + 47] == NO_SOURCE, "r = 0.94");
+    }
+
+    #[test]
+    fn wrong_buffers_are_errors() {
+        let error = fill_source_map(&CAMERA, &CAMERA, &LENS, &mut [[0.0; 2]; 3]).unwrap_err();
+        assert_eq!(error, BufferSizeError { expected: 307_200, found: 3 });
+        let map = [[0.0, 0.0]; 2];
+        assert!(remap_nearest(&[1, 2, 3], 2, 2, &map, &mut [0; 2]).is_err());
+        assert!(remap_nearest(&[1, 2, 3, 4], 2, 2, &map, &mut [0; 3]).is_err());
+        assert!(remap_bilinear(&[[1]; 4], 2, 2, &map, &mut [[0]; 1]).is_err());
+    }
+}

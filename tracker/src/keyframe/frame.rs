@@ -21,6 +21,8 @@ const CELL: [usize; MAX_LEVELS] = [24, 14, 9, 6, 4, 4];
 pub struct Keyframe<'m> {
     /// Reference image; sharp, or as sharp as could be had.
     pub pyramid: GreyPyramid<'m>,
+    /// Full-resolution image as captured.
+    pub captured: &'m mut [f32],
     /// Inverse depth.
     pub depth: InverseDepthMap<'m>,
     /// Surface planes of `depth`.
@@ -48,7 +50,9 @@ impl<'m> Keyframe<'m> {
             level += 1;
         }
         let surface = (width >> surface_level) * (height >> surface_level);
-        sum + 4 * slice_bytes::<f32>(surface) + levels * slice_bytes::<Keypoint>(MAX_KEYPOINTS)
+        sum + slice_bytes::<f32>(width * height)
+            + 4 * slice_bytes::<f32>(surface)
+            + levels * slice_bytes::<Keypoint>(MAX_KEYPOINTS)
     }
 
     /// Takes the memory of a keyframe.
@@ -70,6 +74,7 @@ impl<'m> Keyframe<'m> {
         }
         Ok(Self {
             pyramid,
+            captured: arena.take(camera.width * camera.height)?,
             depth,
             planes,
             keypoints,

@@ -1,6 +1,7 @@
 //! Configuration and memory plan.
 
 use crate::align::AlignSettings;
+use crate::deblur::DeblurScratch;
 use crate::error::ConfigError;
 use crate::geometry::PinholeCamera;
 use crate::image::{GreyPyramid, MAX_LEVELS};
@@ -35,6 +36,10 @@ pub struct TrackerConfig {
     pub reference: ReferenceMode,
     /// Settings of the alignment.
     pub align: AlignSettings,
+    /// Richardson-Lucy iterations on a keyframe.
+    pub deblur_iterations: usize,
+    /// debug
+    pub debug: Option<fn(usize, &[f32], &[f32])>,
     /// Whether the first guess may be changed by trying several motions on the coarse levels.
     pub hypotheses: bool,
 }
@@ -59,6 +64,8 @@ impl TrackerConfig {
             surface_level,
             reference: ReferenceMode::Deblurred,
             align: AlignSettings::default(),
+            deblur_iterations: 5,
+            debug: None,
             hypotheses: true,
         }
     }
@@ -120,7 +127,11 @@ pub const fn workspace_len(width: usize, height: usize, levels: usize, surface_l
     let scratch = slice_bytes::<PatchSite>(MAX_KEYPOINTS)
         + slice_bytes::<PatchCost>(MAX_KEYPOINTS)
         + slice_bytes::<f32>(SCALE_SAMPLES);
-    ARENA_ALIGNMENT + frame + Keyframe::bytes(width, height, levels, surface_level) + scratch
+    ARENA_ALIGNMENT
+        + frame
+        + Keyframe::bytes(width, height, levels, surface_level)
+        + scratch
+        + DeblurScratch::bytes(width, height)
 }
 
 /// Upper bound of the residuals that a robust scale is computed from.

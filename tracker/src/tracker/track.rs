@@ -14,6 +14,7 @@ use crate::align::{
     AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, MotionPrior, ReferenceData, StopReason,
     align_level, blur_length,
 };
+use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
 use crate::geometry::RigidTransform;
 use crate::image::GreyPyramid;
@@ -34,6 +35,7 @@ pub struct Tracker<'m> {
     depth: InverseDepthMap<'m>,
     keyframe: Keyframe<'m>,
     scratch: AlignScratch<'m>,
+    deblur: DeblurScratch<'m>,
     motion: Option<Motion>,
     brightness: BrightnessModel,
     frames: usize,
@@ -58,6 +60,7 @@ impl<'m> Tracker<'m> {
                 costs: arena.take(MAX_KEYPOINTS)?,
                 medians: arena.take(SCALE_SAMPLES)?,
             },
+            deblur: DeblurScratch::carve(&mut arena, config.camera.width, config.camera.height)?,
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),
@@ -178,7 +181,7 @@ impl<'m> Tracker<'m> {
                 let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
                 estimate.keyframe_from_camera =
                     ExposureTrajectory::from_mid_and_motion(&mid, &prior.expected);
-                let result = align_level(&alignment, level, estimate, &prior, 2, &mut self.scratch);
+                let result = align_level(&alignment, level, estimate, &prior, 4, &mut self.scratch);
                 iterations += result.iterations;
                 estimate = result.estimate;
                 outcome = Some(result);
@@ -196,14 +199,7 @@ impl<'m> Tracker<'m> {
             let mid = outcome.estimate.keyframe_from_camera.mid();
             let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
             let estimate = oriented(outcome.estimate, &prior);
-            outcome = align_level(
-                &alignment,
-                level,
-                estimate,
-                &prior,
-                if level == 0 { 1 } else { 2 },
-                &mut self.scratch,
-            );
+            outcome = align_level(&alignment, level, estimate, &prior, 2, &mut self.scratch);
             iterations += outcome.iterations;
         }
         (outcome, iterations)
@@ -279,8 +275,37 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
-        if self.config.reference == ReferenceMode::Deblurred {}
         self.keyframe.prepare(MIN_STRENGTH, self.config.align.dark_intensity);
+        if self.config.reference == ReferenceMode::Deblurred && blur > 1.0 {
+            self.sharpen_keyframe();
+        }
+    }
+
+    fn sharpen_keyframe(&mut self) {
+        let Some(exposure) = self.keyframe.keyframe_from_camera else { return };
+        let keyframe = &mut self.keyframe;
+        let typical = typical_inverse_depth(keyframe) as f32;
+        let longest = self.deblur.flow.fill(
+            &exposure,
+            &self.config.camera,
+            &keyframe.planes,
+            self.config.surface_level,
+            typical,
+        );
+        let sharp = &mut keyframe.pyramid.levels[0];
+        keyframe.captured.copy_from_slice(sharp.pixels);
+        self.deblur.deblur(
+            self.simd,
+            longest,
+            self.config.deblur_iterations,
+            keyframe.captured,
+            sharp.pixels,
+        );
+        keyframe.pyramid.reduce();
+        keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity);
+        if let Some(sink) = self.config.debug {
+            sink(keyframe.frame_index, keyframe.captured, keyframe.pyramid.levels[0].pixels);
+        }
     }
 }
 

@@ -11,7 +11,7 @@ const MAX_PIXELS: usize = 1 << 24;
 ///
 /// Four neighbours are read as two pairs of adjacent floats, one 64-bit load each: measured against a hardware
 /// gather this is faster on every CPU tried and needs no `unsafe`.
-pub(super) struct BilinearSampler<'a, S: Simd> {
+pub(crate) struct BilinearSampler<'a, S: Simd> {
     simd: S,
     /// All rows but the last, and all rows but the first: an index into one is the cell above or below.
     top: &'a [f32],
@@ -24,16 +24,16 @@ pub(super) struct BilinearSampler<'a, S: Simd> {
 }
 
 /// Interpolated intensities and, per pixel of displacement, their derivatives.
-pub(super) struct Sampled<S: Simd> {
-    pub(super) value: S::f32s,
-    pub(super) gradient_u: S::f32s,
-    pub(super) gradient_v: S::f32s,
+pub(crate) struct Sampled<S: Simd> {
+    pub(crate) value: S::f32s,
+    pub(crate) gradient_u: S::f32s,
+    pub(crate) gradient_v: S::f32s,
 }
 
 impl<'a, S: Simd> BilinearSampler<'a, S> {
     /// `None` if the image is narrower than one cell, larger than 2^24 pixels or shorter than it claims.
     #[inline(always)]
-    pub(super) fn new(simd: S, image: &LevelImage<'a>) -> Option<Self> {
+    pub(crate) fn new(simd: S, image: &LevelImage<'a>) -> Option<Self> {
         let (width, height) = (image.width, image.height);
         let count = width.checked_mul(height).filter(|&count| count <= MAX_PIXELS)?;
         let pixels = image.pixels.get(..count)?;
@@ -57,13 +57,19 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
 
     /// Lanes within `[0, W-1] x [0, H-1]`; false for NaN.
     #[inline(always)]
-    pub(super) fn contains(&self, u: S::f32s, v: S::f32s) -> S::mask32s {
+    pub(crate) fn contains(&self, u: S::f32s, v: S::f32s) -> S::mask32s {
         (u.simd_ge(0.0) & u.simd_le(self.last_u)) & (v.simd_ge(0.0) & v.simd_le(self.last_v))
+    }
+
+    /// The nearest point of `[0, W-1] x [0, H-1]`.
+    #[inline(always)]
+    pub(crate) fn clamp(&self, u: S::f32s, v: S::f32s) -> (S::f32s, S::f32s) {
+        (u.max(0.0).min(self.last_u), v.max(0.0).min(self.last_v))
     }
 
     /// Samples at `(u, v)`. Lanes outside the image return something unspecified, possibly NaN.
     #[inline(always)]
-    pub(super) fn sample(&self, u: S::f32s, v: S::f32s) -> Sampled<S> {
+    pub(crate) fn sample(&self, u: S::f32s, v: S::f32s) -> Sampled<S> {
         // Truncation is floor for valid lanes. Clamping after it makes the cell valid whatever the lane holds.
         let cell_u = truncate::<S>(u).max(0.0).min(self.last_cell_u);
         let cell_v = truncate::<S>(v).max(0.0).min(self.last_cell_v);

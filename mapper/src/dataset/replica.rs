@@ -1,0 +1,138 @@
+//! The Replica sequences rendered for NICE-SLAM (Zhu et al., CVPR 2022): `results/frame000000.jpg`,
+//! `results/depth000000.png`, one 4x4 camera-to-world matrix per line of `traj.txt`, and `cam_params.json` in
+//! the folder or the one above.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mba_tracker::geometry::{Distortion, PinholeCamera};
+use serde::Deserialize;
+
+use super::calibration::{ASSUMED_EXPOSURE_SHARE, InvalidValue};
+use super::numbered_images::{self, ImageFolder};
+use super::pose_matrix::pose_from_rows;
+use super::sequence::{Contents, FrameEntry};
+use super::{
+    Calibration, DatasetError, ExposureSource, Readout, Response, TimedPose, Warning, calibration_file,
+};
+use crate::FileError;
+use crate::text_lines::TextFile;
+
+const TRAJECTORY: &str = "traj.txt";
+const IMAGES: &str = "results";
+const CAMERA: &str = "cam_params.json";
+
+/// Frames per second that are assumed: the files have no times.
+const FRAME_RATE: f64 = 30.0;
+
+#[derive(Deserialize)]
+struct CameraFile {
+    camera: CameraKeys,
+}
+
+#[derive(Deserialize)]
+struct CameraKeys {
+    w: usize,
+    h: usize,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    scale: f64,
+}
+
+/// Whether `folder` looks like this layout.
+pub(super) fn recognise(folder: &Path) -> bool {
+    folder.join(TRAJECTORY).is_file() && folder.join(IMAGES).is_dir()
+}
+
+/// Reads images, camera and trajectory. A `calibration.toml` in the folder takes the place of the camera file.
+pub(super) fn read(folder: &Path) -> Result<Contents, DatasetError> {
+    let mut warnings = Vec::new();
+    let own_calibration = folder.join(calibration_file::FILE_NAME);
+    let calibration = if own_calibration.is_file() {
+        calibration_file::read(&own_calibration, None, &mut warnings)?
+    } else {
+        read_camera(&camera_path(folder))?
+    };
+    let images = folder.join(IMAGES);
+    let colour = ImageFolder { path: &images, prefix: "frame" };
+    let depth = ImageFolder { path: &images, prefix: "depth" };
+    let numbered = numbered_images::pair(&colour, &depth, calibration.frame_rate, &mut warnings)?;
+    let ground_truth = read_poses(&folder.join(TRAJECTORY), &numbered, &mut warnings)?;
+    Ok(Contents {
+        calibration,
+        colour_camera: None,
+        entries: numbered.into_iter().map(|(_, entry)| entry).collect(),
+        ground_truth,
+        ground_truth_exposures: Vec::new(),
+        warnings,
+    })
+}
+
+/// In the folder itself, else in the one above.
+fn camera_path(folder: &Path) -> PathBuf {
+    let beside = folder.join(CAMERA);
+    if beside.is_file() {
+        return beside;
+    }
+    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    absolute.parent().map_or(beside, |above| above.join(CAMERA))
+}
+
+fn read_camera(path: &Path) -> Result<Calibration, DatasetError> {
+    let text =
+        fs::read_to_string(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let CameraFile { camera } = serde_json::from_str(&text).map_err(|error| {
+        let message = error.to_string();
+        DatasetError::CalibrationSyntax {
+            path: path.to_owned(),
+            line: error.line(),
+            message: message.split(" at line ").next().unwrap_or_default().to_owned(),
+        }
+    })?;
+    let CameraKeys { w: width, h: height, fx, fy, cx, cy, scale } = camera;
+    let calibration = Calibration {
+        camera: PinholeCamera { width, height, fx, fy, cx, cy },
+        distortion: Distortion::default(),
+        depth_scale: scale,
+        exposure: ExposureSource::Assumed { seconds: ASSUMED_EXPOSURE_SHARE / FRAME_RATE },
+        frame_rate: FRAME_RATE,
+        response: Response::Srgb,
+        readout: Readout::Global,
+    };
+    let own_key = |invalid: InvalidValue| {
+        let key = match invalid.key {
+            "width" => "w",
+            "height" => "h",
+            "depth_scale" => "scale",
+            other => other,
+        };
+        calibration_file::invalid_value(path, &text, InvalidValue { key, ..invalid })
+    };
+    calibration.check().map_err(own_key)?;
+    Ok(calibration)
+}
+
+/// The pose of each frame: line n belongs to image number n.
+fn read_poses(
+    path: &Path,
+    numbered: &[(usize, FrameEntry)],
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<TimedPose>, DatasetError> {
+    const EXPECTED: &str = "the 16 numbers of a 4x4 camera-to-world matrix, row by row";
+    let file = TextFile::read(path)?;
+    let poses = file
+        .lines()
+        .map(|line| pose_from_rows(&line.numbers(EXPECTED)?, path, line.number))
+        .collect::<Result<Vec<_>, FileError>>()?;
+    let timed = |(number, entry): &(usize, FrameEntry)| {
+        Some(TimedPose { timestamp: entry.timestamp, world_from_camera: *poses.get(*number)? })
+    };
+    let mut beyond = numbered.iter().filter(|(number, _)| *number >= poses.len());
+    if let Some((_, first)) = beyond.next() {
+        let (count, first) = (1 + beyond.count(), first.colour.clone());
+        warnings.push(Warning::PosesMissing { count, first });
+    }
+    Ok(numbered.iter().filter_map(timed).collect())
+}

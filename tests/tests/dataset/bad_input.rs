@@ -1,0 +1,164 @@
+//! What is said about bad or odd input.
+
+use std::fs;
+use std::path::Path;
+
+use mba_mapper::dataset::{self, DatasetError, FrameError, Readout, Response};
+
+use crate::folder::{Folder, HEIGHT, WIDTH, colour_image};
+
+#[test]
+fn a_damaged_frame_is_an_error_of_that_frame_only() {
+    let folder = Folder::complete();
+    fs::remove_file(folder.path.join("rgb/0.png")).unwrap();
+    folder.truncate("depth/1.png", 60);
+    let dataset = folder.open();
+    assert_eq!(folder.warnings(), ["1 listed images do not exist, first rgb/0.png"]);
+    let missing = dataset.frame(0).unwrap_err();
+    assert!(folder.shortened(&missing).starts_with("cannot read rgb/0.png: "), "{missing}");
+    let damaged = dataset.frame(1).unwrap_err();
+    assert!(folder.shortened(&damaged).starts_with("depth/1.png is damaged or cut off: "), "{damaged}");
+    assert!(dataset.frame(2).is_ok());
+    assert_eq!(dataset.frame(3).unwrap_err().to_string(), "frame 3 does not exist, the data set has 3");
+
+    folder.write("rgb/0.png", "this is no image");
+    let no_image = dataset.frame(0).unwrap_err();
+    assert!(matches!(no_image, FrameError::Damaged { .. }), "{no_image}");
+    folder.write("depth/2.png", "");
+    assert!(matches!(dataset.frame(2).unwrap_err(), FrameError::Damaged { .. }));
+}
+
+#[test]
+fn images_of_another_size_or_type_are_errors() {
+    let folder = Folder::complete();
+    let larger = colour_image(9, HEIGHT);
+    larger.save(folder.path.join("rgb/1.png")).unwrap();
+    let message = folder.shortened(&folder.open().frame(1).unwrap_err());
+    assert_eq!(message, "rgb/1.png has 9 x 6 pixels, the calibration says 8 x 6");
+    larger.to_luma8().save(folder.path.join("depth/0.png")).unwrap();
+    assert_eq!(folder.message(), "depth/0.png has 9 x 6 pixels, the calibration says 8 x 6");
+    colour_image(WIDTH, HEIGHT).to_luma8().save(folder.path.join("depth/0.png")).unwrap();
+    let message = folder.shortened(&folder.open().frame(0).unwrap_err());
+    assert_eq!(message, "depth/0.png has pixels of type L8, expected 16-bit grey (L16) for depth");
+}
+
+#[test]
+fn bad_lists_are_named_with_line_and_value() {
+    let folder = Folder::complete();
+    let line = |time: &str| format!("{time} rgb/0.png {time} depth/0.png\n");
+    folder.write("associations.txt", &[line("2"), line("1.5")].concat());
+    assert!(folder.message().starts_with("associations.txt, line 2: timestamp 1.5 comes after 2; sort"));
+    folder.write("associations.txt", &[line("2"), line("2.0")].concat());
+    assert_eq!(
+        folder.message(),
+        "associations.txt, line 2: timestamp 2 occurs twice; remove one of the lines"
+    );
+    folder.write("associations.txt", "# nothing\n");
+    assert_eq!(folder.message(), "associations.txt lists no images");
+    folder.write("associations.txt", "1 rgb/0.png depth/0.png\n");
+    assert_eq!(
+        folder.message(),
+        "associations.txt, line 1: expected timestamp image timestamp depth-image, \
+         found \"1 rgb/0.png depth/0.png\""
+    );
+    folder.write("associations.txt", &line("inf"));
+    assert_eq!(folder.message(), "associations.txt, line 1: inf is not a finite number");
+
+    fs::remove_file(folder.path.join("associations.txt")).unwrap();
+    assert!(matches!(folder.open_error(), DatasetError::UnknownLayout { .. }));
+    folder.write("rgb.txt", "1 rgb/0.png\n");
+    folder.write("depth.txt", "2 depth/0.png\n1 depth/1.png\n");
+    assert!(folder.message().starts_with("depth.txt, line 2: timestamp 1 comes after 2; sort"));
+    folder.write("depth.txt", "");
+    assert_eq!(folder.message(), "depth.txt lists no images");
+}
+
+#[test]
+fn absurd_calibrations_are_named_with_line_and_value() {
+    for (from, to, expected) in [
+        ("fx = 7.0", "fx = 0", "line 3: fx = 0, expected a focal length in pixels, above 0 and at most 100"),
+        ("fy = 7.5", "fy = -7.5", "line 4: fy = -7.5, expected a focal length"),
+        ("fx = 7.0", "fx = 801.0", "line 3: fx = 801, expected a focal length"),
+        ("fx = 7.0", "fx = nan", "line 3: fx = NaN, expected a focal length"),
+        ("cx = 3.5", "cx = 17", "line 5: cx = 17, expected a principal point in pixels, in or near"),
+        ("cy = 2.5", "cy = -inf", "line 6: cy = -inf, expected a principal point"),
+        ("width = 8", "width = 0", "line 1: width = 0, expected a size from 1 to 16384 pixels"),
+        ("height = 6", "height = 99999", "line 2: height = 99999, expected a size"),
+        (
+            "depth_scale = 5000",
+            "depth_scale = 0",
+            "line 7: depth_scale = 0, expected a positive number of raw",
+        ),
+        (
+            "exposure_seconds = 0.016",
+            "exposure_seconds = -1",
+            "line 8: exposure_seconds = -1, expected a pos",
+        ),
+        ("frame_rate = 30", "frame_rate = 0", "line 9: frame_rate = 0, expected a positive number of frames"),
+        (
+            "frame_rate",
+            "distortion = [0, 0, inf, 0, 0]\nframe_rate",
+            "line 9: distortion = inf, expected fin",
+        ),
+        ("fy = 7.5", "fyy = 7.5", "line 4: unknown field `fyy`, expected one of `width`"),
+        ("fy = 7.5\n", "", "line 1: missing field `fy`"),
+        ("fy = 7.5", "fy = \"a\"", "line 4: invalid type: string \"a\", expected f64"),
+        ("fy = 7.5", "fy 7.5", "line 4: "),
+        ("\"global\"", "\"sideways\"", "line 11: unknown variant `sideways`, expected `global` or `rolling`"),
+    ] {
+        let folder = Folder::complete();
+        folder.edit("calibration.toml", from, to);
+        let message = folder.message();
+        assert!(message.starts_with(&format!("calibration.toml, {expected}")), "{message}");
+        assert!(!message.contains('\n'), "{message}");
+    }
+}
+
+#[test]
+fn folders_that_hold_nothing_are_named() {
+    let folder = Folder::named("empty");
+    assert!(folder.message().starts_with("FOLDER holds no known data set; expected associations.txt or"));
+    let missing = folder.root.path().join("missing");
+    let message = dataset::open(Path::new(&missing)).unwrap_err().to_string();
+    assert!(message.starts_with(&format!("cannot read {}: ", missing.display())), "{message}");
+}
+
+#[test]
+fn odd_timing_is_reported() {
+    let folder = Folder::complete();
+    folder.edit("calibration.toml", "0.016", "0.05");
+    assert_eq!(folder.warnings(), ["exposure of 0.05 s is longer than the 0.033333 s between frames"]);
+    folder.edit("calibration.toml", "frame_rate = 30", "frame_rate = 5");
+    assert_eq!(folder.warnings(), ["the calibration says 5 frames per second, the timestamps 30.00"]);
+
+    let folder = Folder::complete();
+    let line = |time: f64| format!("{time} rgb/0.png {time} depth/0.png\n");
+    let times = [0.0, 0.033, 0.066, 0.2, 0.233, 0.266, 1.0, 1.033];
+    folder.write("associations.txt", &times.map(line).concat());
+    assert_eq!(folder.warnings(), ["2 gaps between frames, the longest 0.734 s after 0.266"]);
+}
+
+#[test]
+fn assumptions_about_the_camera_are_reported() {
+    let folder = Folder::complete();
+    for line in [
+        "exposure_seconds = 0.016\n",
+        "frame_rate = 30\n",
+        "response = \"linear\"\n",
+        "readout = \"global\"\n",
+    ] {
+        folder.edit("calibration.toml", line, "");
+    }
+    let calibration = folder.open().calibration().clone();
+    assert!((calibration.frame_rate - 30.0).abs() < 0.01);
+    assert_eq!((calibration.response, calibration.readout), (Response::Srgb, Readout::Global));
+    assert_eq!(
+        folder.warnings(),
+        [
+            "frame_rate is not given, 30.00 (from the timestamps) is assumed",
+            "readout is not given, \"global\" is assumed",
+            "response is not given, \"srgb\" is assumed",
+            "exposure_seconds is not given, 0.0167 s (0.5 of the frame interval) is assumed",
+        ]
+    );
+}

@@ -1,0 +1,144 @@
+//! Deblurring an image with its own, known motion.
+//!
+//! The blur of a frame whose exposure was estimated is a known linear operator: the mean over virtual views. Its
+//! inverse is approached by Richardson-Lucy iterations, which keep light non-negative and conserved, and which
+//! are the maximum-likelihood estimate under photon noise. Stopping early is the regularisation.
+
+mod flow;
+mod line_blur;
+
+pub use flow::{BLOCK_HEIGHT, BLOCK_WIDTH, BlurFlow};
+pub use line_blur::blur_along;
+
+use fearless_simd::{Level, dispatch, f32x8, prelude::*};
+
+use crate::math::sqrt_f32;
+use crate::transfer::MAX_VIRTUAL_VIEWS;
+use crate::workspace::{Arena, WorkspaceError, slice_bytes};
+
+/// Light added to both sides of the ratio, so that black pixels neither divide by zero nor dominate.
+const RATIO_FLOOR: f32 = 0.01;
+
+/// Largest factor on a pixel in one iteration: keeps noise in dark pixels from exploding.
+const RATIO_LIMIT: f32 = 3.0;
+
+/// Light from which a pixel counts as clipped: its true light is unknown and corrects nothing.
+const SATURATION: f32 = 0.98;
+
+/// Memory for deblurring images of one size.
+#[derive(Debug)]
+pub struct DeblurScratch<'m> {
+    /// Blur path of every block.
+    pub flow: BlurFlow<'m>,
+    reblurred: &'m mut [f32],
+    correction: &'m mut [f32],
+}
+
+/// How well an image explains its captured version before and after deblurring.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeblurReport {
+    /// Root mean square difference between captured and reblurred captured image, linear light.
+    pub residual_before: f32,
+    /// Root mean square difference between captured and reblurred sharp image, linear light.
+    pub residual_after: f32,
+    /// Whether the sharp image was kept; otherwise it is the captured one.
+    pub kept: bool,
+}
+
+impl<'m> DeblurScratch<'m> {
+    /// Bytes of workspace for images of this size.
+    #[must_use]
+    pub const fn bytes(width: usize, height: usize) -> usize {
+        BlurFlow::bytes(width, height) + 2 * slice_bytes::<f32>(width * height)
+    }
+
+    /// Takes the memory from `arena`.
+    ///
+    /// # Errors
+    /// [`WorkspaceError`] when the arena is exhausted.
+    pub fn carve(arena: &mut Arena<'m>, width: usize, height: usize) -> Result<Self, WorkspaceError> {
+        Ok(Self {
+            flow: BlurFlow::carve(arena, width, height)?,
+            reblurred: arena.take(width * height)?,
+            correction: arena.take(width * height)?,
+        })
+    }
+
+    /// Deblurs `captured` into `sharp` along the flow, whose longest displacement is `longest` pixels.
+    ///
+    /// The result never explains the captured image worse than the captured image itself does: if it did, the
+    /// motion was wrong and `sharp` is a copy of `captured`.
+    pub fn deblur(
+        &mut self,
+        level: Level,
+        longest: f32,
+        iterations: usize,
+        captured: &[f32],
+        sharp: &mut [f32],
+    ) -> DeblurReport {
+        let views = (longest / TAP_SPACING) as usize + 2;
+        let views = views.clamp(3, MAX_VIRTUAL_VIEWS);
+        sharp.copy_from_slice(captured);
+        let mut residual_before = 0.0;
+        for iteration in 0..iterations {
+            let residual = self.iterate(level, views, captured, sharp);
+            if iteration == 0 {
+                residual_before = residual;
+            }
+        }
+        blur_along(level, sharp, &self.flow, views, self.reblurred);
+        let squares = dispatch!(level, simd => ratios(simd, captured, self.reblurred));
+        let residual_after = root_mean(squares, captured.len());
+        let kept = residual_after < residual_before;
+        if !kept {
+            sharp.copy_from_slice(captured);
+        }
+        DeblurReport { residual_before, residual_after, kept }
+    }
+
+    /// One Richardson-Lucy iteration; returns the root mean square residual before it.
+    fn iterate(&mut self, level: Level, views: usize, captured: &[f32], sharp: &mut [f32]) -> f32 {
+        blur_along(level, sharp, &self.flow, views, self.reblurred);
+        let squares = dispatch!(level, simd => ratios(simd, captured, self.reblurred));
+        blur_along(level, self.reblurred, &self.flow, views, self.correction);
+        for (light, factor) in sharp.iter_mut().zip(&*self.correction) {
+            *light *= factor;
+        }
+        root_mean(squares, captured.len())
+    }
+}
+
+/// Distance between neighbouring taps along the longest path, pixels.
+const TAP_SPACING: f32 = 1.5;
+
+fn root_mean(squares: f64, count: usize) -> f32 {
+    sqrt_f32((squares / count.max(1) as f64) as f32)
+}
+
+/// Replaces reblurred light by the ratio captured/reblurred; returns the sum of squared differences.
+#[inline(always)]
+fn ratios<S: Simd>(simd: S, captured: &[f32], reblurred: &mut [f32]) -> f64 {
+    const RUN: usize = 512;
+    let mut total = 0.0;
+    for (captured, reblurred) in captured.chunks(RUN).zip(reblurred.chunks_mut(RUN)) {
+        let mut sum = f32x8::splat(simd, 0.0);
+        let split = captured.len() / 8 * 8;
+        for (b, r) in captured.chunks_exact(8).zip(reblurred.chunks_exact_mut(8)) {
+            let (light, modelled) = (f32x8::from_slice(simd, b), f32x8::from_slice(simd, r));
+            let difference = light - modelled;
+            sum = difference.mul_add(difference, sum);
+            let ratio = (light + RATIO_FLOOR) / (modelled + RATIO_FLOOR);
+            let ratio = ratio.max(1.0 / RATIO_LIMIT).min(RATIO_LIMIT);
+            let one = f32x8::splat(simd, 1.0);
+            light.simd_gt(SATURATION).select(one, ratio).store_slice(r);
+        }
+        for (&light, modelled) in captured[split..].iter().zip(&mut reblurred[split..]) {
+            let difference = light - *modelled;
+            total += f64::from(difference * difference);
+            let ratio = (light + RATIO_FLOOR) / (*modelled + RATIO_FLOOR);
+            *modelled = if light > SATURATION { 1.0 } else { ratio.clamp(1.0 / RATIO_LIMIT, RATIO_LIMIT) };
+        }
+        total += f64::from(sum.as_slice().iter().sum::<f32>());
+    }
+    total
+}

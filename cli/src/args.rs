@@ -5,6 +5,9 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
+use mba_mapper::tracking::TrackingOptions;
+use mba_tracker::ReferenceMode;
+use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
 
 /// Motion-blur-aware RGB-D tracking on a CPU.
 #[derive(Debug, Parser)]
@@ -41,6 +44,8 @@ pub struct Global {
 pub enum Command {
     /// Show what a data set holds, lacks and what is odd about it
     Info(Info),
+    /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
+    Track(Track),
     /// Write report.html and charts into a RUN folder
     Report(Report),
     /// Measure an estimate against a reference
@@ -61,6 +66,88 @@ pub struct Info {
     /// Folder of the data set
     #[arg(value_name = "DATASET")]
     pub dataset: PathBuf,
+}
+
+/// Arguments of `mba track`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+RUN gets trajectory.txt (TUM lines at mid exposure), exposures.txt (poses at opening, middle and closing), \
+frames.csv and summary.json. It is kept up to date while the run goes on.
+
+Examples:
+  mba track rgbd_dataset_freiburg1_rpy --out run
+  mba track data --out run-without-blur --blur off")]
+pub struct Track {
+    /// Folder of the data set
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// RUN folder to write; an earlier run in it is replaced
+    #[arg(long, value_name = "RUN")]
+    pub out: PathBuf,
+    /// Choices about the tracker
+    #[command(flatten)]
+    pub tracking: Tracking,
+}
+
+/// Choices about the tracker.
+#[derive(Clone, Debug, Default, Args)]
+pub struct Tracking {
+    /// Model the motion during the exposure, or take every frame for sharp
+    #[arg(long, value_enum, default_value_t)]
+    pub blur: BlurMode,
+    /// Virtual views per exposure, at the most; default: as many as the blur length asks for
+    #[arg(long, value_name = "N", value_parser = virtual_views)]
+    pub virtual_views: Option<usize>,
+    /// Keyframes as they are, or deblurred with their own motion
+    #[arg(long, value_enum, default_value_t)]
+    pub reference: Reference,
+    /// Use the depth map of each frame, or only that of the keyframe
+    #[arg(long, value_enum, default_value_t)]
+    pub depth_term: Switch,
+}
+
+/// Values of `--blur`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum BlurMode {
+    /// Virtual views along the motion, as many as the blur length asks for
+    #[default]
+    Auto,
+    /// One view per frame
+    Off,
+}
+
+/// Values of `--reference`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Reference {
+    /// As captured
+    Raw,
+    /// Deblurred where that lowers the residual
+    #[default]
+    Deblurred,
+}
+
+/// On or off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// Yes
+    #[default]
+    On,
+    /// No
+    Off,
+}
+
+impl From<&Tracking> for TrackingOptions {
+    fn from(args: &Tracking) -> Self {
+        Self {
+            blur: args.blur == BlurMode::Auto,
+            virtual_views: args.virtual_views,
+            reference: match args.reference {
+                Reference::Raw => ReferenceMode::Raw,
+                Reference::Deblurred => ReferenceMode::Deblurred,
+            },
+            depth_term: args.depth_term == Switch::On,
+        }
+    }
 }
 
 /// Arguments of `mba report`.
@@ -141,5 +228,13 @@ fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
         _ => Err("a number that is not negative is needed".to_owned()),
+    }
+}
+
+/// A number of virtual views that the tracker has room for.
+fn virtual_views(text: &str) -> Result<usize, String> {
+    match text.parse::<usize>() {
+        Ok(views) if (1..=MAX_VIRTUAL_VIEWS).contains(&views) => Ok(views),
+        _ => Err(format!("a number from 1 to {MAX_VIRTUAL_VIEWS} is needed")),
     }
 }

@@ -50,6 +50,7 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
 fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
     match command {
         Command::Info(args) => commands::info::run(args, console),
+        Command::Track(args) => commands::track::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
     }

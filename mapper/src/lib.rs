@@ -5,6 +5,7 @@ mod error;
 pub mod evaluation;
 pub mod run;
 mod text_lines;
+pub mod tracking;
 pub mod trajectory_file;
 
 pub use error::FileError;

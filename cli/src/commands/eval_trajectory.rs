@@ -7,6 +7,7 @@ use mba_mapper::dataset::survey;
 use mba_mapper::evaluation::{
     BlurFigures, TrajectoryError, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
 };
+use mba_mapper::run::mid_pose;
 use mba_mapper::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
 use serde::Serialize;
 
@@ -102,8 +103,7 @@ impl Poses {
             return Ok(Self { trajectory: read_trajectory(path).or_bad_input(HINT)?, exposures: None });
         }
         let exposures = read_exposures(path).or_bad_input(HINT)?;
-        let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };
-        Ok(Self { trajectory: exposures.iter().map(mid).collect(), exposures: Some(exposures) })
+        Ok(Self { trajectory: exposures.iter().map(mid_pose).collect(), exposures: Some(exposures) })
     }
 }
 

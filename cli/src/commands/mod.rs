@@ -4,3 +4,4 @@ pub mod eval_trajectory;
 pub mod info;
 pub mod open;
 pub mod report;
+pub mod track;

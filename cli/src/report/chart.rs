@@ -8,7 +8,7 @@ use plotters::prelude::*;
 /// Width and height of a chart in its own units; on a telephone it is shown at about two thirds of this size.
 const SIZE: (u32, u32) = (580, 360);
 const MARGIN: u32 = 10;
-const LEFT_LABELS: u32 = 62;
+const LEFT_LABELS: u32 = 66;
 const BOTTOM_LABELS: u32 = 42;
 const TITLE_HEIGHT: u32 = 30;
 const FONT: &str = "sans-serif";
@@ -19,7 +19,7 @@ const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_IN_SVG: &str = "#010203";
 
 /// The estimate.
-pub(super) const ESTIMATE: RGBColor = RGBColor(37, 99, 235);
+pub(super) const ESTIMATE: RGBColor = RGBColor(52, 120, 246);
 /// The truth.
 pub(super) const TRUTH: RGBColor = RGBColor(234, 148, 20);
 /// What is bad: lost frames, the border of real time.
@@ -74,11 +74,11 @@ impl Chart {
             let area = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
             let mut chart = ChartBuilder::on(&area)
                 .margin(MARGIN)
-                .caption(&self.title, (FONT, 17).into_font().color(&INK))
+                .caption(&self.title, (FONT, 19).into_font().color(&INK))
                 .x_label_area_size(BOTTOM_LABELS)
                 .y_label_area_size(LEFT_LABELS)
                 .build_cartesian_2d(Axis(x_range), Axis(y_range))?;
-            let text = || (FONT, 13).into_font().color(&INK);
+            let text = || (FONT, 15).into_font().color(&INK);
             chart
                 .configure_mesh()
                 .x_labels(7)
@@ -228,7 +228,7 @@ mod tests {
     fn a_map_has_one_scale() {
         let (x, y) = chart(vec![(0.0, 0.0), (4.0, 0.5)], true).ranges().unwrap();
         let per_unit = |r: &Range<f64>, page: f64| page / (r.end - r.start);
-        assert!((per_unit(&x, 498.0) - per_unit(&y, 268.0)).abs() < 1e-9);
+        assert!((per_unit(&x, 494.0) - per_unit(&y, 268.0)).abs() < 1e-9);
         assert!(x.start < 0.0 && x.end > 4.0 && y.start < 0.0 && y.end > 0.5);
     }
 
@@ -236,7 +236,7 @@ mod tests {
     fn a_gap_interrupts_the_line() {
         let svg = chart(vec![(0.0, 1.0), (1.0, 2.0), (2.0, f64::NAN), (3.0, 1.0), (4.0, 2.0)], false);
         let svg = svg.to_svg().unwrap().unwrap();
-        assert_eq!(svg.matches("#2563EB").count(), 2, "{svg}");
+        assert_eq!(svg.matches("#3478F6").count(), 2, "{svg}");
         assert!(svg.contains("currentColor") && !svg.contains(INK_IN_SVG));
     }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
+use mba_mapper::run::{Spread, Summary};
 
 /// The table of a trajectory evaluation, lengths in metres, angles in degrees.
 #[must_use]
@@ -30,6 +31,26 @@ pub fn trajectory(figures: &TrajectoryFigures) -> String {
         ("within 2 cm", percent(figures.share_within_2cm)),
     ];
     text + &pairs(&rows) + &scale_row(figures.scale)
+}
+
+/// The table of a run: counts, times and, with ground truth, figures of merit.
+#[must_use]
+pub fn summary(summary: &Summary) -> String {
+    let counts = &summary.frames;
+    let doubt = [("weak", counts.weak), ("lost", counts.lost), ("skipped", counts.skipped)];
+    let doubt: String = doubt.iter().map(|(name, n)| format!(", {n} {name}")).collect();
+    let tracked = format!("{} of {}{doubt}", percent(counts.tracked_share()), counts.total);
+    let mut rows = vec![("tracked", tracked), ("keyframes", counts.keyframes.to_string())];
+    let spread = |s: &Spread, unit: &str| {
+        format!("median {:.2}, p95 {:.2}, p99 {:.2}, max {:.2} {unit}", s.median, s.p95, s.p99, s.max)
+    };
+    rows.extend(summary.milliseconds.iter().map(|s| ("time per frame", spread(s, "ms"))));
+    rows.extend(summary.blur_px.iter().map(|s| ("estimated blur", spread(s, "px"))));
+    let mut text = pairs(&rows);
+    for part in [summary.trajectory.as_ref().map(trajectory), summary.blur.as_ref().map(blur)] {
+        text.extend(part.map(|part| "\n".to_owned() + &part));
+    }
+    text
 }
 
 /// The table of the blur figures.

@@ -2,7 +2,7 @@
 
 use mba_mapper::dataset::{Dataset, survey};
 use mba_mapper::evaluation::{TrajectoryOptions, blur_length, evaluate_trajectory, motion_of};
-use mba_mapper::run::{FrameStatus, Run};
+use mba_mapper::run::{FrameStatus, Run, mid_pose};
 use mba_mapper::trajectory_file::{TimedExposure, TimedPose};
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::Vector3;
@@ -55,8 +55,7 @@ impl RunView {
     }
 
     fn add_truth(&mut self, run: &Run, dataset: &Dataset, start: f64) {
-        let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };
-        let poses: Vec<TimedPose> = run.exposures.iter().map(mid).collect();
+        let poses: Vec<TimedPose> = run.exposures.iter().map(mid_pose).collect();
         let truth = dataset.ground_truth();
         // A run too short or too straight to be aligned is shown without truth.
         let Ok(evaluation) = evaluate_trajectory(truth, &poses, &TrajectoryOptions::default()) else {

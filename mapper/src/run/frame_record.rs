@@ -37,7 +37,7 @@ pub struct FrameRecord {
     pub virtual_views: u32,
     /// Solver iterations over all levels.
     pub iterations: u32,
-    /// Root mean square of the inliers' photometric residual, intensities in `[0, 1]`.
+    /// Robust photometric residual, in standard deviations of the nominal noise.
     pub residual: f64,
     /// Share (0 to 1) of the patches that are inliers.
     pub inliers: f64,

@@ -11,12 +11,14 @@
 
 mod error;
 mod frame_record;
+mod merit;
 mod reader;
 mod summary;
 mod writer;
 
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
+pub use merit::{Merit, mid_pose};
 pub use reader::Run;
 pub use summary::{FrameCounts, RunSettings, Spread, Summary};
 pub use writer::RunWriter;

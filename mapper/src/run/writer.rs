@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::merit::mid_pose;
 use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
 use super::{FrameRecord, RunError, RunSettings, Summary, frame_record};
 use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory, write_whole};
@@ -124,10 +125,6 @@ impl Drop for RunWriter {
             let _ = self.flush();
         }
     }
-}
-
-fn mid_pose(exposure: &TimedExposure) -> TimedPose {
-    TimedPose { timestamp: exposure.timestamp, world_from_camera: exposure.mid }
 }
 
 #[cfg(test)]

@@ -1,4 +1,6 @@
 //! Helpers shared by the whole-system tests.
 
+pub mod handheld;
+pub mod plane_scene;
 pub mod reference_values;
 pub mod transfer_scene;

@@ -9,6 +9,7 @@ use mba_tracker::{Frame, FrameResult, SimdLevel, Tracker, TrackerConfig};
 use nalgebra::Vector3;
 
 use crate::plane_scene::{DEPTH_SCALE, PlaneScene, bytes_of, raw_depth_of};
+use crate::transfer_scene::Uniform;
 
 /// Camera with a horizontal field of view of about 60 degrees.
 #[must_use]
@@ -31,29 +32,24 @@ pub fn workspace(config: &TrackerConfig) -> Vec<u8> {
     vec![0; config.workspace_len()]
 }
 
-/// A smooth path of the camera: sums of sines, at the world's origin at time 0.
+/// A smooth path of the camera that starts at rest at the world's origin at time 0.
 #[derive(Clone, Copy, Debug)]
 pub struct Shake {
-    /// Largest deviation in metres.
+    /// Amplitude in metres.
     pub metres: f64,
-    /// Largest deviation in radians.
+    /// Amplitude in radians.
     pub radians: f64,
     /// Cycles per second.
     pub hertz: f64,
 }
 
 impl Shake {
-    /// A camera that stands still.
-    pub const NONE: Self = Self { metres: 0.0, radians: 0.0, hertz: 1.0 };
-
     /// `world_from_camera` at time `t` in seconds.
     #[must_use]
     pub fn pose(&self, t: f64) -> RigidTransform {
-        let wave = |frequency: f64, phase: f64| {
-            (core::f64::consts::TAU * self.hertz * frequency * t + phase).sin() - phase.sin()
-        };
-        let rotation = Vector3::new(0.5 * wave(1.1, 0.4), wave(0.9, 0.0), 0.4 * wave(1.3, 0.9));
-        let translation = Vector3::new(wave(1.0, 0.1), 0.6 * wave(0.8, 0.5), 0.7 * wave(0.7, 0.2));
+        let wave = |frequency: f64| 1.0 - (core::f64::consts::TAU * self.hertz * frequency * t).cos();
+        let rotation = Vector3::new(-0.5 * wave(1.1), wave(0.9), 0.4 * wave(1.3));
+        let translation = Vector3::new(wave(1.0), -0.6 * wave(0.8), 0.7 * wave(0.7));
         RigidTransform::new(so3::exp(&(rotation * self.radians)), translation * self.metres)
     }
 
@@ -93,10 +89,12 @@ impl RenderedFrame {
     ) -> Self {
         let sharp = scene.sharp(camera, &truth.mid());
         let views = if truth.start == truth.end { 1 } else { 13 };
+        let mut light = scene.blurred(camera, &truth, views);
+        add_noise(&mut light, timestamp);
         Self {
             timestamp,
             exposure,
-            grey: bytes_of(&scene.blurred(camera, &truth, views)),
+            grey: bytes_of(&light),
             depth: raw_depth_of(&sharp.depth),
             truth,
             size: (camera.width, camera.height),
@@ -128,6 +126,15 @@ impl RenderedFrame {
             depth: self.depth.iter().enumerate().map(|(k, &value)| depth(k, value)).collect(),
             ..self.clone()
         }
+    }
+}
+
+/// Noise of a well-lit sensor: uniform with a standard deviation of 1.5 bytes, drawn anew for every frame.
+fn add_noise(light: &mut [f32], timestamp: f64) {
+    const BOUND: f64 = 1.5 * 1.732 / 255.0;
+    let mut draw = Uniform::new(timestamp.to_bits());
+    for light in light {
+        *light = (*light + draw.within(-BOUND, BOUND) as f32).clamp(0.0, 1.0);
     }
 }
 

@@ -52,8 +52,8 @@ impl PlaneScene {
         };
         let planes = vec![
             plane(z * 3.0, [x, y], 30.0),
-            plane(x * -1.3, [z, y], 30.0),
-            plane(y * 0.9, [x, z], 30.0),
+            plane(x * -0.9, [z, y], 30.0),
+            plane(y * 0.8, [x, z], 30.0),
             plane(Vector3::new(0.35, 0.1, 2.2), [x, y], 0.25),
         ];
         Self { planes }

@@ -1,1 +1,57 @@
 //! The commands of the `mba` program as a library, so that tests can call them without a process.
+//!
+//! Exit codes: 0 done, 1 failed, 2 wrong use or bad input. Results go to stdout, everything else to stderr.
+
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+pub mod args;
+pub mod commands;
+pub mod console;
+pub mod failure;
+pub mod report;
+
+use args::{Cli, Command, EvalCommand};
+use console::Console;
+
+/// Parses the command line (program name first), runs the command, reports an error and returns the exit code.
+pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version are "errors" of the parser too and have exit code 0. A closed pipe is nobody's loss.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    match run(&cli) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{}", failure::message(&error));
+            ExitCode::from(failure::exit_code(&error))
+        }
+    }
+}
+
+/// Runs a parsed command line.
+///
+/// # Errors
+/// Whatever stops the command; [`failure::exit_code`] tells bad input from failure.
+pub fn run(cli: &Cli) -> anyhow::Result<()> {
+    let console = Console::new(&cli.global);
+    let threads = cli.global.threads.map_or(0, NonZeroUsize::get);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    pool.install(|| dispatch(&cli.command, &console))
+}
+
+fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
+    match command {
+        Command::Info(args) => commands::info::run(args, console),
+        Command::Track(args) => commands::track::run(args, console),
+        Command::Report(args) => commands::report::run(args, console),
+        Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
+    }
+}

@@ -1,3 +1,7 @@
 //! The `mba` program.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    mba_cli::main(std::env::args_os())
+}

@@ -2,7 +2,10 @@
 
 pub mod dataset;
 mod error;
+pub mod evaluation;
+pub mod run;
 mod text_lines;
+pub mod tracking;
 pub mod trajectory_file;
 
 pub use error::FileError;

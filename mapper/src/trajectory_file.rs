@@ -147,7 +147,7 @@ fn push_pose(text: &mut String, pose: &RigidTransform) {
 }
 
 /// Writes beside the file and renames, so that a full disk never leaves half a file.
-fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {
+pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {
     let partial = path.with_added_extension("partial");
     fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|reason| {
         // Only a left-over is lost if this fails too.

@@ -27,6 +27,7 @@ mod pose_matrix;
 mod replica;
 mod scannet;
 mod sequence;
+mod survey;
 mod tum;
 
 use std::fs;
@@ -38,6 +39,7 @@ pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, Reado
 pub use error::{DatasetError, FrameError, Warning};
 pub use frame::RgbdFrame;
 pub use sequence::Dataset;
+pub use survey::{Survey, survey};
 
 /// How a data set is opened.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,180 @@
+//! `mba info`.
+
+use mba_mapper::dataset::{Calibration, Dataset, ExposureSource, Readout, Response, Survey, survey};
+use mba_mapper::evaluation::associate;
+use serde::Serialize;
+
+use super::open;
+use crate::args::Info;
+use crate::console::Console;
+use crate::report::table::{pairs, percent};
+
+/// Frames whose images are read.
+const SAMPLED_FRAMES: usize = 16;
+
+/// What is printed.
+#[derive(Serialize)]
+struct Facts {
+    name: String,
+    folder: String,
+    frames: usize,
+    first_timestamp: f64,
+    duration_s: f64,
+    measured_rate_hz: Option<f64>,
+    width: usize,
+    height: usize,
+    fx: f64,
+    fy: f64,
+    cx: f64,
+    cy: f64,
+    distortion: [f64; 5],
+    depth_scale: f64,
+    response: &'static str,
+    readout: &'static str,
+    exposure_source: &'static str,
+    shortest_exposure_s: f64,
+    longest_exposure_s: f64,
+    sampled_frames: usize,
+    unreadable_frames: usize,
+    frames_without_depth: usize,
+    missing_depth_share: Option<f64>,
+    median_depth_m: Option<f64>,
+    ground_truth_poses: usize,
+    ground_truth_share_of_frames: f64,
+    ground_truth_exposures: usize,
+    warnings: Vec<String>,
+}
+
+/// Opens a data set, looks at some of its frames and prints what is there.
+///
+/// # Errors
+/// Bad input when the data set cannot be used.
+pub fn run(args: &Info, console: &Console) -> anyhow::Result<()> {
+    let dataset = open::dataset(&args.dataset)?;
+    console.result(&Facts::of(&dataset, survey(&dataset, SAMPLED_FRAMES)), table)
+}
+
+impl Facts {
+    fn of(dataset: &Dataset, survey: Survey) -> Self {
+        let stamps: Vec<f64> = (0..dataset.len()).map(|k| dataset.timestamp(k)).collect();
+        let exposures = || (0..dataset.len()).map(|k| dataset.exposure_seconds(k));
+        let duration_s = stamps.last().zip(stamps.first()).map_or(0.0, |(last, first)| last - first);
+        let calibration = dataset.calibration();
+        let (camera, lens) = (calibration.camera, calibration.distortion);
+        Self {
+            name: dataset.name().to_owned(),
+            folder: dataset.folder().display().to_string(),
+            frames: dataset.len(),
+            first_timestamp: stamps.first().copied().unwrap_or_default(),
+            duration_s,
+            measured_rate_hz: (duration_s > 0.0).then(|| (dataset.len() - 1) as f64 / duration_s),
+            width: camera.width,
+            height: camera.height,
+            fx: camera.fx,
+            fy: camera.fy,
+            cx: camera.cx,
+            cy: camera.cy,
+            distortion: [lens.k1, lens.k2, lens.p1, lens.p2, lens.k3],
+            depth_scale: calibration.depth_scale,
+            response: response_name(calibration),
+            readout: readout_name(calibration.readout),
+            exposure_source: exposure_name(calibration.exposure),
+            shortest_exposure_s: exposures().fold(f64::INFINITY, f64::min),
+            longest_exposure_s: exposures().fold(0.0, f64::max),
+            sampled_frames: survey.sampled,
+            unreadable_frames: survey.unreadable.len(),
+            frames_without_depth: survey.without_depth,
+            missing_depth_share: survey.missing_depth,
+            median_depth_m: survey.median_depth,
+            ground_truth_poses: dataset.ground_truth().len(),
+            ground_truth_share_of_frames: truth_share(dataset, &stamps),
+            ground_truth_exposures: dataset.ground_truth_exposures().len(),
+            warnings: warnings(dataset, survey),
+        }
+    }
+}
+
+/// Share of the frames whose mid exposure lies within a frame interval of a true pose.
+fn truth_share(dataset: &Dataset, stamps: &[f64]) -> f64 {
+    let truth: Vec<f64> = dataset.ground_truth().iter().map(|pose| pose.timestamp).collect();
+    let interval = 1.0 / dataset.calibration().frame_rate;
+    associate(&truth, stamps, 0.5 * interval).len() as f64 / stamps.len().max(1) as f64
+}
+
+fn warnings(dataset: &Dataset, survey: Survey) -> Vec<String> {
+    let mut warnings: Vec<String> = dataset.warnings().iter().map(ToString::to_string).collect();
+    warnings.extend(survey.unreadable);
+    if survey.without_depth > 0 {
+        let (empty, sampled) = (survey.without_depth, survey.sampled);
+        warnings.push(format!("{empty} of {sampled} sampled depth images hold no depth at all"));
+    }
+    warnings
+}
+
+fn response_name(calibration: &Calibration) -> &'static str {
+    match calibration.response {
+        Response::Srgb => "srgb",
+        Response::Linear => "linear",
+        Response::Table(_) => "table",
+    }
+}
+
+fn readout_name(readout: Readout) -> &'static str {
+    match readout {
+        Readout::Global => "global",
+        Readout::Rolling => "rolling",
+    }
+}
+
+fn exposure_name(source: ExposureSource) -> &'static str {
+    match source {
+        ExposureSource::Constant { .. } => "calibration",
+        ExposureSource::PerFrame => "per frame",
+        ExposureSource::Assumed { .. } => "assumed",
+    }
+}
+
+fn table(facts: &Facts) -> String {
+    let rate = facts.measured_rate_hz.map_or(String::new(), |hz| format!(", {hz:.2} frames per second"));
+    let missing = facts.missing_depth_share.map_or_else(|| "unknown".into(), percent);
+    let depth = facts.median_depth_m.map_or_else(|| "none".into(), |m| format!("{m:.2} m"));
+    let truth = match facts.ground_truth_poses {
+        0 => "none".to_owned(),
+        n => format!("{n} poses, near {} of the frames", percent(facts.ground_truth_share_of_frames)),
+    };
+    let mut rows = vec![
+        ("data set", facts.name.clone()),
+        ("frames", format!("{} in {:.2} s{rate}", facts.frames, facts.duration_s)),
+        ("image size", format!("{} x {}", facts.width, facts.height)),
+        ("focal length", format!("{:.2} {:.2} px", facts.fx, facts.fy)),
+        ("principal point", format!("{:.2} {:.2} px", facts.cx, facts.cy)),
+        ("distortion", distortion(&facts.distortion)),
+        ("response, readout", format!("{}, {}", facts.response, facts.readout)),
+        ("exposure", exposure(facts)),
+        ("depth scale", format!("{} per metre", facts.depth_scale)),
+        ("median depth", depth),
+        ("missing depth", format!("{missing} of {} sampled frames", facts.sampled_frames)),
+        ("ground truth", truth),
+        ("true exposures", facts.ground_truth_exposures.to_string()),
+    ];
+    rows.extend(facts.warnings.iter().map(|warning| ("warning", warning.clone())));
+    pairs(&rows)
+}
+
+fn exposure(facts: &Facts) -> String {
+    let (shortest, longest) = (1e3 * facts.shortest_exposure_s, 1e3 * facts.longest_exposure_s);
+    let range = if shortest == longest {
+        format!("{shortest:.2} ms")
+    } else {
+        format!("{shortest:.2} to {longest:.2} ms")
+    };
+    format!("{range} ({})", facts.exposure_source)
+}
+
+fn distortion(coefficients: &[f64; 5]) -> String {
+    if coefficients.iter().all(|k| *k == 0.0) {
+        return "none".to_owned();
+    }
+    let [k1, k2, p1, p2, k3] = coefficients;
+    format!("k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}")
+}

@@ -1,0 +1,7 @@
+//! One file per command.
+
+pub mod eval_trajectory;
+pub mod info;
+pub mod open;
+pub mod report;
+pub mod track;

@@ -1,0 +1,50 @@
+//! Opening inputs with advice for what can go wrong.
+
+use std::path::Path;
+
+use mba_mapper::dataset::{self, Dataset, DatasetError};
+use mba_mapper::run::{Run, RunError};
+
+use crate::failure::OrBadInput;
+
+/// Opens a data set.
+///
+/// # Errors
+/// Bad input with advice.
+pub fn dataset(folder: &Path) -> anyhow::Result<Dataset> {
+    dataset::open(folder).map_err(|error| (dataset_hint(&error), error)).or_else(advise)
+}
+
+/// Opens a RUN folder.
+///
+/// # Errors
+/// Bad input with advice.
+pub fn run(folder: &Path) -> anyhow::Result<Run> {
+    let hint = |error: &RunError| match error {
+        RunError::NotARun { .. } => "give the folder that `mba track --out` wrote",
+        _ => "track the sequence again, or restore the file",
+    };
+    Run::open(folder).map_err(|error| (hint(&error), error)).or_else(advise)
+}
+
+fn advise<T, E>((hint, error): (&'static str, E)) -> anyhow::Result<T>
+where
+    E: std::error::Error + Send + Sync + 'static,
+{
+    Err(error).or_bad_input(hint)
+}
+
+fn dataset_hint(error: &DatasetError) -> &'static str {
+    match error {
+        DatasetError::File(_) => "correct that line or file",
+        DatasetError::UnknownLayout { .. } => "give the folder that holds the lists of images",
+        DatasetError::MissingCalibration { .. } => "see the data set section of the README for an example",
+        DatasetError::CalibrationSyntax { .. } | DatasetError::CalibrationValue { .. } => {
+            "correct the calibration; lengths are in pixels of the stored images"
+        }
+        DatasetError::EmptyList { .. } => "the list needs lines `timestamp file`",
+        DatasetError::NoAssociation { .. } => "write associations.txt to pair the images yourself",
+        DatasetError::SizeMismatch { .. } => "the calibration must be that of the stored image size",
+        _ => "see `mba info --help` for what a data set needs",
+    }
+}

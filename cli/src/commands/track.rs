@@ -1,0 +1,88 @@
+//! `mba track`.
+
+use std::path::Path;
+
+use mba_mapper::dataset::Dataset;
+use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
+use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset};
+use serde_json::json;
+
+use super::open;
+use crate::args::{Switch, Track, Tracking};
+use crate::console::Console;
+use crate::failure::OrBadInput;
+use crate::report::table;
+
+/// Tracks a data set into a RUN folder and prints the summary.
+///
+/// # Errors
+/// Bad input when the data set cannot be used; failure when the results cannot be written.
+pub fn run(args: &Track, console: &Console) -> anyhow::Result<()> {
+    let dataset = open::dataset(&args.dataset)?;
+    let summary = track_into(&dataset, &args.out, &args.tracking, console)?;
+    console.result(&summary, table::summary)
+}
+
+/// Tracks `dataset` into the RUN folder `out`.
+///
+/// # Errors
+/// As [`run`].
+pub fn track_into(
+    dataset: &Dataset,
+    out: &Path,
+    args: &Tracking,
+    console: &Console,
+) -> anyhow::Result<Summary> {
+    let mut writer = RunWriter::create(out, settings(dataset, args)).or_else(advise_output)?;
+    for warning in dataset.warnings() {
+        console.warning(warning.to_string());
+        writer.warn(warning.to_string());
+    }
+    let progress = console.progress(dataset.len(), "tracking");
+    let tracked = track_dataset(dataset, &TrackingOptions::from(args), &mut writer, |_| progress.inc(1));
+    progress.finish_and_clear();
+    match tracked {
+        Err(TrackingError::Camera(error)) => {
+            Err(error).or_bad_input("check the calibration: the tracker needs at least 32 x 32 pixels")?;
+        }
+        other => other?,
+    }
+    let merit = Merit::of(writer.exposures(), dataset);
+    let summary = writer.finish(|summary| {
+        summary.trajectory = merit.trajectory;
+        summary.blur = merit.blur;
+    })?;
+    if summary.frames.skipped > 0 {
+        let first = summary.warnings.iter().find(|w| w.starts_with("frame "));
+        let reason = first.map_or("see summary.json", String::as_str);
+        console.warning(format!("{} frames were skipped, the first: {reason}", summary.frames.skipped));
+    }
+    console.note(format!("wrote {}", out.display()));
+    Ok(summary)
+}
+
+fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
+    // The run may be looked at from another directory.
+    let folder = dataset.folder().canonicalize().unwrap_or_else(|_| dataset.folder().to_owned());
+    let options = TrackingOptions::from(args);
+    let values = json!({
+        "blur": if options.blur { "auto" } else { "off" },
+        "virtual_views": options.virtual_views.map_or_else(|| json!("auto"), |n| json!(n)),
+        "reference": format!("{:?}", options.reference).to_lowercase(),
+        "depth_term": if args.depth_term == Switch::On { "on" } else { "off" },
+    });
+    RunSettings {
+        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
+        dataset: folder.display().to_string(),
+        frame_rate: dataset.calibration().frame_rate,
+        options: values.as_object().cloned().unwrap_or_default(),
+    }
+}
+
+/// An output that cannot be written from the start is wrong use; a full disk is not.
+fn advise_output(error: RunError) -> anyhow::Result<RunWriter> {
+    match error {
+        RunError::DiskFull { .. } => Err(error.into()),
+        _ => Err(error).or_bad_input("name a folder for --out that can be created or written"),
+    }
+}

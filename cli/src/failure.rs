@@ -1,0 +1,104 @@
+//! From errors to one line, a hint and an exit code.
+
+use std::error::Error;
+use std::fmt;
+
+/// Exit code of wrong use or bad input.
+pub const BAD_INPUT: u8 = 2;
+/// Exit code of a failure that is not the input's fault.
+pub const FAILED: u8 = 1;
+
+/// An error that the user can repair, with advice.
+#[derive(Debug)]
+pub struct BadInput {
+    source: Box<dyn Error + Send + Sync>,
+    hint: String,
+}
+
+impl fmt::Display for BadInput {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.source)
+    }
+}
+
+impl Error for BadInput {
+    fn source(&self) -> Option<&(dyn Error + 'static)> {
+        self.source.source()
+    }
+}
+
+/// Marks errors as the input's fault.
+pub trait OrBadInput<T> {
+    /// Turns the error into [`BadInput`] with `hint` as advice.
+    ///
+    /// # Errors
+    /// The marked error.
+    fn or_bad_input(self, hint: impl Into<String>) -> anyhow::Result<T>;
+}
+
+impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrBadInput<T> for Result<T, E> {
+    fn or_bad_input(self, hint: impl Into<String>) -> anyhow::Result<T> {
+        self.map_err(|source| BadInput { source: source.into(), hint: hint.into() }.into())
+    }
+}
+
+/// A [`BadInput`] without an underlying error.
+pub fn bad_input(message: impl Into<String>, hint: impl Into<String>) -> anyhow::Error {
+    BadInput { source: message.into().into(), hint: hint.into() }.into()
+}
+
+/// Exit code of an error.
+#[must_use]
+pub fn exit_code(error: &anyhow::Error) -> u8 {
+    if error.is::<BadInput>() { BAD_INPUT } else { FAILED }
+}
+
+/// `error: ...` with its causes on one line and, where there is advice, `hint: ...` on the next.
+#[must_use]
+pub fn message(error: &anyhow::Error) -> String {
+    let mut text = String::from("error: ");
+    let mut last = String::new();
+    for cause in error.chain().map(|cause| cause.to_string().replace('\n', " ")) {
+        // Many libraries repeat the cause inside their own message.
+        if !last.contains(&cause) {
+            if !last.is_empty() {
+                text.push_str(": ");
+            }
+            text.push_str(&cause);
+            last = cause;
+        }
+    }
+    match error.downcast_ref::<BadInput>() {
+        Some(bad) if !bad.hint.is_empty() => format!("{text}\nhint: {}", bad.hint),
+        _ => text,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use anyhow::Context;
+
+    use super::*;
+
+    #[test]
+    fn bad_input_has_a_hint_and_code_2() {
+        let error = bad_input("rgb.txt:3: no such image", "remove the line");
+        assert_eq!(exit_code(&error), 2);
+        assert_eq!(message(&error), "error: rgb.txt:3: no such image\nhint: remove the line");
+    }
+
+    #[test]
+    fn context_keeps_the_code() {
+        let error =
+            Err::<(), _>(bad_input("no calibration", "add one")).context("cannot open data").unwrap_err();
+        assert_eq!(exit_code(&error), 2);
+        assert_eq!(message(&error), "error: cannot open data: no calibration\nhint: add one");
+    }
+
+    #[test]
+    fn other_errors_are_failures_on_one_line() {
+        let error = anyhow::anyhow!("first\nsecond");
+        assert_eq!(exit_code(&error), 1);
+        assert_eq!(message(&error), "error: first second");
+    }
+}

@@ -1,0 +1,96 @@
+//! A look at a few frames of a data set before any long work.
+
+use super::{Dataset, RgbdFrame};
+
+/// What a sample of frames shows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Survey {
+    /// Frames looked at.
+    pub sampled: usize,
+    /// What is wrong with those of them that cannot be read, one sentence each.
+    pub unreadable: Vec<String>,
+    /// Readable frames without a single depth value.
+    pub without_depth: usize,
+    /// Share (0 to 1) of the pixels of the readable frames whose depth is missing; `None` without readable frames.
+    pub missing_depth: Option<f64>,
+    /// Median depth in metres; `None` when all depth is missing.
+    pub median_depth: Option<f64>,
+}
+
+/// Looks at up to `max_frames` frames (at least one), evenly spread over the whole data set.
+#[must_use]
+pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
+    let sampled = max_frames.clamp(1, dataset.len().max(1));
+    let mut unreadable = Vec::new();
+    let mut without_depth = 0;
+    let mut counts = DepthCounts::new();
+    for k in 0..sampled {
+        match dataset.frame(k * dataset.len() / sampled) {
+            Ok(frame) => {
+                without_depth += usize::from(frame.depth_is_empty());
+                counts.add(&frame);
+            }
+            Err(error) => unreadable.push(error.to_string()),
+        }
+    }
+    Survey {
+        sampled,
+        unreadable,
+        without_depth,
+        missing_depth: counts.missing_share(),
+        median_depth: counts.median_raw().map(|raw| raw / dataset.calibration().depth_scale),
+    }
+}
+
+/// How often each raw depth value occurs.
+struct DepthCounts(Vec<u64>);
+
+impl DepthCounts {
+    fn new() -> Self {
+        Self(vec![0; usize::from(u16::MAX) + 1])
+    }
+
+    fn add(&mut self, frame: &RgbdFrame) {
+        for depth in &frame.depth {
+            self.0[usize::from(*depth)] += 1;
+        }
+    }
+
+    fn missing_share(&self) -> Option<f64> {
+        let total: u64 = self.0.iter().sum();
+        (total > 0).then(|| self.0[0] as f64 / total as f64)
+    }
+
+    /// The smallest raw value that at least half of the values that are not missing do not exceed.
+    fn median_raw(&self) -> Option<f64> {
+        let valid: u64 = self.0[1..].iter().sum();
+        let mut seen = 0;
+        self.0.iter().enumerate().skip(1).find_map(|(raw, count)| {
+            seen += count;
+            (valid > 0 && 2 * seen >= valid).then_some(raw as f64)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_counts_know_share_and_median() {
+        let depth = vec![0, 0, 0, 100, 200, 65_535, 300, 250];
+        let frame = RgbdFrame {
+            index: 0,
+            timestamp: 0.0,
+            exposure_seconds: 0.01,
+            width: 8,
+            height: 1,
+            rgb: vec![0; 24],
+            depth,
+        };
+        let mut counts = DepthCounts::new();
+        assert_eq!((counts.missing_share(), counts.median_raw()), (None, None));
+        counts.add(&frame);
+        assert_eq!((counts.missing_share(), counts.median_raw()), (Some(0.375), Some(250.0)));
+    }
+}

@@ -1,0 +1,20 @@
+//! How good an estimate is: pure functions on slices, no files.
+//!
+//! Trajectory figures follow the definitions of the `evo` package (`evo_ape`, `evo_rpe`), so that numbers can be
+//! compared with published ones.
+
+mod alignment;
+mod association;
+mod exposure;
+mod figures;
+mod statistics;
+mod trajectory;
+
+pub use alignment::{Alignment, AlignmentError, Similarity, align};
+pub use association::{DEFAULT_MAX_DT, Match, associate};
+pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, blur_length, evaluate_blur, motion_of};
+pub use figures::{BlurFigures, TrajectoryFigures};
+pub use statistics::{Statistics, quantile, share_within};
+pub use trajectory::{
+    GOOD_FRAME_METRES, TrajectoryError, TrajectoryEvaluation, TrajectoryOptions, evaluate_trajectory,
+};

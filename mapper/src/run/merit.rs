@@ -1,0 +1,49 @@
+//! Figures of merit of a run whose data set has ground truth.
+
+use crate::dataset::{Dataset, survey};
+use crate::evaluation::{
+    BlurFigures, DEFAULT_MAX_DT, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
+};
+use crate::trajectory_file::{TimedExposure, TimedPose};
+
+/// Frames from which the median depth of a data set is taken.
+const SAMPLED_FRAMES: usize = 16;
+
+/// What the ground truth of a data set says about estimated exposures; each part is absent without the truth for it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Merit {
+    /// Trajectory errors after SE(3) alignment.
+    pub trajectory: Option<TrajectoryFigures>,
+    /// Errors of the motion within the exposure.
+    pub blur: Option<BlurFigures>,
+}
+
+impl Merit {
+    /// Compares `exposures` with the ground truth of `dataset`; what cannot be compared, e.g. because two frames do
+    /// not determine an alignment, stays absent.
+    #[must_use]
+    pub fn of(exposures: &[TimedExposure], dataset: &Dataset) -> Self {
+        let poses: Vec<TimedPose> = exposures.iter().map(mid_pose).collect();
+        let evaluation = evaluate_trajectory(dataset.ground_truth(), &poses, &TrajectoryOptions::default());
+        Self {
+            trajectory: evaluation.ok().map(|e| TrajectoryFigures::from(&e)),
+            blur: blur(exposures, dataset),
+        }
+    }
+}
+
+/// The pose at mid exposure.
+#[must_use]
+pub fn mid_pose(exposure: &TimedExposure) -> TimedPose {
+    TimedPose { timestamp: exposure.timestamp, world_from_camera: exposure.mid }
+}
+
+fn blur(exposures: &[TimedExposure], dataset: &Dataset) -> Option<BlurFigures> {
+    let truth = dataset.ground_truth_exposures();
+    if truth.is_empty() {
+        return None;
+    }
+    let depth = survey(dataset, SAMPLED_FRAMES).median_depth?;
+    let camera = &dataset.calibration().camera;
+    Some(BlurFigures::from(&evaluate_blur(truth, exposures, DEFAULT_MAX_DT, camera, depth)))
+}

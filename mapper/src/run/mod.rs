@@ -1,0 +1,33 @@
+//! The RUN folder: what commands hand to each other.
+//!
+//! | file | content |
+//! |---|---|
+//! | `trajectory.txt` | camera-to-world at mid exposure, every input frame once, TUM lines |
+//! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
+//! | `frames.csv` | one [`FrameRecord`] per frame |
+//! | `summary.json` | a [`Summary`] |
+//!
+//! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
+
+mod error;
+mod frame_record;
+mod merit;
+mod reader;
+mod summary;
+mod writer;
+
+pub use error::RunError;
+pub use frame_record::{FrameRecord, FrameStatus};
+pub use merit::{Merit, mid_pose};
+pub use reader::Run;
+pub use summary::{FrameCounts, RunSettings, Spread, Summary};
+pub use writer::RunWriter;
+
+/// Name of the trajectory at mid exposure.
+pub const TRAJECTORY_FILE: &str = "trajectory.txt";
+/// Name of the poses at opening, middle and closing of the shutter.
+pub const EXPOSURES_FILE: &str = "exposures.txt";
+/// Name of the table of frames.
+pub const FRAMES_FILE: &str = "frames.csv";
+/// Name of the summary.
+pub const SUMMARY_FILE: &str = "summary.json";

@@ -1,0 +1,129 @@
+//! `summary.json`.
+
+use serde::{Deserialize, Serialize};
+
+use super::{FrameRecord, FrameStatus};
+use crate::evaluation::{BlurFigures, TrajectoryFigures, quantile};
+
+/// Version of the summary's layout.
+const FORMAT: u32 = 1;
+
+/// What a run was started with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunSettings {
+    /// Program and version, e.g. `mba 0.1.0`.
+    pub program: String,
+    /// The data set's folder.
+    pub dataset: String,
+    /// Frames per second of the data set: one over it is the time a frame may take.
+    pub frame_rate: f64,
+    /// Options of the command by name.
+    pub options: serde_json::Map<String, serde_json::Value>,
+}
+
+/// Settings, counts and figures of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// Version of this layout.
+    pub format: u32,
+    /// Whether the run reached the end of its input.
+    pub complete: bool,
+    /// What the run was started with.
+    #[serde(flatten)]
+    pub settings: RunSettings,
+    /// Frames by status.
+    pub frames: FrameCounts,
+    /// Tracking time per frame in milliseconds, over all frames that were tried.
+    pub milliseconds: Option<Spread>,
+    /// Estimated blur length in pixels, over all frames that were not lost.
+    pub blur_px: Option<Spread>,
+    /// Figures of merit, when the data set has ground truth.
+    pub trajectory: Option<TrajectoryFigures>,
+    /// Figures of merit of the exposures, when the data set has ground truth for them.
+    pub blur: Option<BlurFigures>,
+    /// Oddities of the input, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Frames by status.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct FrameCounts {
+    /// All frames of the input so far.
+    pub total: usize,
+    /// Aligned.
+    pub ok: usize,
+    /// Aligned with doubt.
+    pub weak: usize,
+    /// Not aligned, including the skipped ones.
+    pub lost: usize,
+    /// Not tried because an image was missing or damaged.
+    pub skipped: usize,
+    /// Frames that became keyframes.
+    pub keyframes: usize,
+}
+
+impl FrameCounts {
+    /// Share (0 to 1) of the frames that are not lost; 0 without frames.
+    #[must_use]
+    pub fn tracked_share(&self) -> f64 {
+        (self.ok + self.weak) as f64 / self.total.max(1) as f64
+    }
+}
+
+/// Where the bulk and the tail of a quantity lie.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spread {
+    /// Arithmetic mean.
+    pub mean: f64,
+    /// Middle value.
+    pub median: f64,
+    /// 95 % of the values are not larger.
+    pub p95: f64,
+    /// 99 % of the values are not larger.
+    pub p99: f64,
+    /// Largest value.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of the finite ones of `values`; `None` without any.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        Some(Self {
+            mean: finite.iter().sum::<f64>() / finite.len().max(1) as f64,
+            median: quantile(&finite, 0.5)?,
+            p95: quantile(&finite, 0.95)?,
+            p99: quantile(&finite, 0.99)?,
+            max: quantile(&finite, 1.0)?,
+        })
+    }
+}
+
+impl Summary {
+    /// The summary of the frames so far, without figures of merit.
+    pub(super) fn of(settings: &RunSettings, frames: &[FrameRecord], skipped: usize) -> Self {
+        let count = |status| frames.iter().filter(|f| f.status == status).count();
+        let times: Vec<f64> = frames.iter().map(|f| f.ms).collect();
+        let blurs: Vec<f64> =
+            frames.iter().filter(|f| f.status != FrameStatus::Lost).map(|f| f.blur_px).collect();
+        Self {
+            format: FORMAT,
+            complete: false,
+            settings: settings.clone(),
+            frames: FrameCounts {
+                total: frames.len(),
+                ok: count(FrameStatus::Ok),
+                weak: count(FrameStatus::Weak),
+                lost: count(FrameStatus::Lost),
+                skipped,
+                keyframes: frames.iter().filter(|f| f.keyframe != 0).count(),
+            },
+            milliseconds: Spread::of(&times),
+            blur_px: Spread::of(&blurs),
+            trajectory: None,
+            blur: None,
+            warnings: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Writing a RUN folder while the run goes on.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::merit::mid_pose;
+use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
+use super::{FrameRecord, RunError, RunSettings, Summary, frame_record};
+use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory, write_whole};
+
+/// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
+const FRAMES_PER_FLUSH: usize = 50;
+
+/// Collects the results of a run and keeps its folder up to date.
+///
+/// When it is dropped before [`Self::finish`], e.g. because of an error, what was pushed is still written, marked as
+/// incomplete.
+#[derive(Debug)]
+pub struct RunWriter {
+    folder: PathBuf,
+    settings: RunSettings,
+    exposures: Vec<TimedExposure>,
+    frames: Vec<FrameRecord>,
+    skipped: usize,
+    warnings: Vec<String>,
+    unwritten: usize,
+}
+
+impl RunWriter {
+    /// Creates the folder with the files of a run without frames, replacing those of an earlier run. So an output
+    /// that cannot be written is noticed before any work is done.
+    ///
+    /// # Errors
+    /// [`RunError::Unwritable`] or [`RunError::DiskFull`].
+    pub fn create(folder: &Path, settings: RunSettings) -> Result<Self, RunError> {
+        fs::create_dir_all(folder).map_err(|reason| RunError::unwritable(folder, reason))?;
+        let mut writer = Self {
+            folder: folder.to_owned(),
+            settings,
+            exposures: Vec::new(),
+            frames: Vec::new(),
+            skipped: 0,
+            warnings: Vec::new(),
+            unwritten: 0,
+        };
+        writer.flush()?;
+        Ok(writer)
+    }
+
+    /// Adds one tracked frame; frames come in order of time.
+    ///
+    /// # Errors
+    /// As [`Self::create`]; the frame is kept for the next try.
+    pub fn push(&mut self, exposure: TimedExposure, record: FrameRecord) -> Result<(), RunError> {
+        self.exposures.push(exposure);
+        self.frames.push(record);
+        self.unwritten += 1;
+        if self.unwritten >= FRAMES_PER_FLUSH { self.flush() } else { Ok(()) }
+    }
+
+    /// Adds a frame that could not be tried: its pose is held, its status should be lost.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub fn push_skipped(&mut self, exposure: TimedExposure, record: FrameRecord) -> Result<(), RunError> {
+        self.skipped += 1;
+        self.push(exposure, record)
+    }
+
+    /// Adds a sentence about the input to the summary.
+    pub fn warn(&mut self, warning: String) {
+        self.warnings.push(warning);
+    }
+
+    /// The exposures so far.
+    #[must_use]
+    pub fn exposures(&self) -> &[TimedExposure] {
+        &self.exposures
+    }
+
+    /// Brings all files up to date, marked as incomplete.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn flush(&mut self) -> Result<(), RunError> {
+        // Even after an error the next attempt waits for more frames: a full disk is not filled at every frame.
+        self.unwritten = 0;
+        self.write(&self.summary())
+    }
+
+    /// Writes the finished run; `figures` completes the summary with figures of merit.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn finish(mut self, figures: impl FnOnce(&mut Summary)) -> Result<Summary, RunError> {
+        let mut summary = Summary { complete: true, ..self.summary() };
+        figures(&mut summary);
+        self.unwritten = 0;
+        self.write(&summary)?;
+        Ok(summary)
+    }
+
+    fn summary(&self) -> Summary {
+        let summary = Summary::of(&self.settings, &self.frames, self.skipped);
+        Summary { warnings: self.warnings.clone(), ..summary }
+    }
+
+    fn write(&self, summary: &Summary) -> Result<(), RunError> {
+        let poses: Vec<TimedPose> = self.exposures.iter().map(mid_pose).collect();
+        write_trajectory(&self.folder.join(TRAJECTORY_FILE), &poses).map_err(RunError::from_write)?;
+        write_exposures(&self.folder.join(EXPOSURES_FILE), &self.exposures).map_err(RunError::from_write)?;
+        let frames = frame_record::format_frames(&self.frames);
+        write_whole(&self.folder.join(FRAMES_FILE), &frames).map_err(RunError::from_write)?;
+        let path = self.folder.join(SUMMARY_FILE);
+        let json = serde_json::to_string_pretty(summary)
+            .map_err(|error| RunError::unwritable(&path, std::io::Error::other(error)))?;
+        write_whole(&path, &(json + "\n")).map_err(RunError::from_write)
+    }
+}
+
+impl Drop for RunWriter {
+    fn drop(&mut self) {
+        if self.unwritten > 0 {
+            // There is nobody left to tell; the error that led here is reported by its own path.
+            let _ = self.flush();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::RigidTransform;
+    use nalgebra::Vector3;
+
+    use super::super::{FrameStatus, Run};
+    use super::*;
+
+    fn settings() -> RunSettings {
+        let options = serde_json::Map::from_iter([("virtual_views".to_owned(), 8.into())]);
+        RunSettings { program: "mba test".into(), dataset: "data".into(), frame_rate: 30.0, options }
+    }
+
+    fn frame(k: usize, status: FrameStatus) -> (TimedExposure, FrameRecord) {
+        let at = |x: f64| RigidTransform { translation: Vector3::new(x, 0.5, -0.25), ..Default::default() };
+        let t = k as f64 / 32.0;
+        let exposure = TimedExposure { timestamp: t, start: at(t - 0.125), mid: at(t), end: at(t + 0.125) };
+        let lost = status == FrameStatus::Lost;
+        let record = FrameRecord {
+            timestamp: t,
+            status,
+            keyframe: u8::from(k == 0),
+            ms: (k + 1) as f64,
+            blur_px: if lost { f64::NAN } else { 2.0 },
+            virtual_views: 8,
+            iterations: 12,
+            residual: if lost { f64::NAN } else { 0.015625 },
+            inliers: 0.75,
+            gain: 1.0,
+        };
+        (exposure, record)
+    }
+
+    fn push(writer: &mut RunWriter, k: usize, status: FrameStatus) {
+        let (exposure, record) = frame(k, status);
+        writer.push(exposure, record).unwrap();
+    }
+
+    #[test]
+    fn a_finished_run_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        push(&mut writer, 0, FrameStatus::Ok);
+        push(&mut writer, 1, FrameStatus::Weak);
+        let (exposure, record) = frame(2, FrameStatus::Lost);
+        writer.push_skipped(exposure, record).unwrap();
+        writer.warn("odd".into());
+        let summary = writer.finish(|_| ()).unwrap();
+        assert_eq!((summary.frames.total, summary.frames.lost, summary.frames.skipped), (3, 1, 1));
+        assert_eq!(summary.frames.tracked_share(), 2.0 / 3.0);
+        assert_eq!(summary.milliseconds.unwrap().median, 2.0);
+        assert_eq!(summary.blur_px.unwrap().max, 2.0);
+
+        let run = Run::open(folder.path()).unwrap();
+        assert_eq!(run.summary, summary);
+        assert!(run.summary.complete);
+        assert_eq!(run.exposures[1], frame(1, FrameStatus::Weak).0);
+        assert_eq!(run.frames[0], frame(0, FrameStatus::Ok).1);
+        assert!(run.frames[2].residual.is_nan());
+        let header = fs::read_to_string(folder.path().join("frames.csv")).unwrap();
+        assert!(header.starts_with(
+            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain\n"
+        ));
+    }
+
+    #[test]
+    fn an_abandoned_run_keeps_its_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        for k in 0..FRAMES_PER_FLUSH {
+            push(&mut writer, k, FrameStatus::Ok);
+        }
+        assert_eq!(
+            Run::open(folder.path()).unwrap().frames.len(),
+            FRAMES_PER_FLUSH,
+            "written as the run goes on"
+        );
+        push(&mut writer, FRAMES_PER_FLUSH, FrameStatus::Ok);
+        drop(writer);
+        let run = Run::open(folder.path()).unwrap();
+        assert_eq!(run.frames.len(), FRAMES_PER_FLUSH + 1);
+        assert!(!run.summary.complete);
+    }
+
+    #[test]
+    fn an_output_below_a_file_is_refused_at_once() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("file");
+        fs::write(&file, "x").unwrap();
+        let error = RunWriter::create(&file.join("run"), settings()).unwrap_err();
+        assert!(error.to_string().contains("file/run"), "{error}");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_leaves_the_last_good_version() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        push(&mut writer, 0, FrameStatus::Ok);
+        writer.flush().unwrap();
+        // Everything written to /dev/full fails for lack of space.
+        std::os::unix::fs::symlink("/dev/full", folder.path().join("frames.csv.partial")).unwrap();
+        push(&mut writer, 1, FrameStatus::Ok);
+        let error = writer.flush().unwrap_err();
+        assert!(matches!(error, RunError::DiskFull { ref path } if path.ends_with("frames.csv")), "{error}");
+        assert_eq!(Run::open(folder.path()).unwrap().frames.len(), 1);
+    }
+}

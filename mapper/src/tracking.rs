@@ -1,0 +1,168 @@
+//! Tracking a whole data set into a RUN folder.
+
+use std::time::Instant;
+
+use mba_tracker::error::{ConfigError, FrameError as TrackError};
+use mba_tracker::geometry::RigidTransform;
+use mba_tracker::image::{ColourView, DepthView, PixelFormat};
+use mba_tracker::{Frame, FrameResult, ReferenceMode, SimdLevel, Tracker, TrackerConfig, workspace_len};
+
+use crate::dataset::{Dataset, FrameError, RgbdFrame};
+use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter};
+use crate::trajectory_file::TimedExposure;
+
+/// What can be chosen about the tracker; everything else follows from the data set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackingOptions {
+    /// Whether motion during the exposure is modelled.
+    pub blur: bool,
+    /// Upper bound of virtual views per exposure; `None` for the tracker's own.
+    pub virtual_views: Option<usize>,
+    /// Where the sharp reference comes from.
+    pub reference: ReferenceMode,
+    /// Whether the depth map of each frame takes part.
+    pub depth_term: bool,
+}
+
+impl Default for TrackingOptions {
+    fn default() -> Self {
+        Self { blur: true, virtual_views: None, reference: ReferenceMode::Deblurred, depth_term: true }
+    }
+}
+
+/// Why tracking a data set stopped.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum TrackingError {
+    /// The data set's camera cannot be tracked with.
+    #[error("the tracker cannot use this camera: {0}")]
+    Camera(ConfigError),
+    /// The results cannot be written.
+    #[error(transparent)]
+    Run(#[from] RunError),
+}
+
+/// The tracker's configuration for a data set.
+#[must_use]
+pub fn tracker_config(dataset: &Dataset, options: &TrackingOptions) -> TrackerConfig {
+    let calibration = dataset.calibration();
+    let metres_per_unit = (1.0 / calibration.depth_scale) as f32;
+    let mut config = TrackerConfig::new(calibration.camera, metres_per_unit, calibration.response.inverse());
+    config.reference = options.reference;
+    config.align.blur = options.blur;
+    config.align.depth_term = options.depth_term;
+    config.align.max_views =
+        options.virtual_views.unwrap_or(config.align.max_views).min(config.align.max_views);
+    config
+}
+
+/// Tracks every frame of `dataset` in order and pushes it to `run`; `observe` is called after each with its record.
+///
+/// A frame that cannot be read or used is skipped: it keeps the pose before it, counts as lost, and `run` gets a
+/// warning that says why. Nothing here depends on threads; the times are of the tracker alone, without reading images.
+///
+/// # Errors
+/// See [`TrackingError`]; what was tracked before stays in `run`.
+pub fn track_dataset(
+    dataset: &Dataset,
+    options: &TrackingOptions,
+    run: &mut RunWriter,
+    mut observe: impl FnMut(&FrameRecord),
+) -> Result<(), TrackingError> {
+    let config = tracker_config(dataset, options);
+    config.validate().map_err(TrackingError::Camera)?;
+    let (width, height) = (config.camera.width, config.camera.height);
+    let mut memory = vec![0; workspace_len(width, height, config.levels, config.surface_level)];
+    let mut tracker = Tracker::new(&config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
+    for index in 0..dataset.len() {
+        let record = match track_frame(&mut tracker, dataset, index) {
+            Ok((exposure, record)) => {
+                run.push(exposure, record)?;
+                record
+            }
+            Err(reason) => {
+                run.warn(format!("frame {index} skipped: {reason}"));
+                let (exposure, record) = held(dataset.timestamp(index), run.exposures().last());
+                run.push_skipped(exposure, record)?;
+                record
+            }
+        };
+        observe(&record);
+    }
+    Ok(())
+}
+
+/// Why one frame was skipped.
+#[derive(Debug, thiserror::Error)]
+enum SkipReason {
+    #[error(transparent)]
+    Unreadable(#[from] FrameError),
+    #[error(transparent)]
+    Unusable(#[from] TrackError),
+}
+
+fn track_frame(
+    tracker: &mut Tracker<'_>,
+    dataset: &Dataset,
+    index: usize,
+) -> Result<(TimedExposure, FrameRecord), SkipReason> {
+    let image = dataset.frame(index)?;
+    let frame = view(&image)?;
+    let begin = Instant::now();
+    let result = tracker.track(&frame)?;
+    let ms = begin.elapsed().as_secs_f64() * 1e3;
+    let path = result.world_from_camera;
+    let exposure =
+        TimedExposure { timestamp: image.timestamp, start: path.start, mid: path.mid(), end: path.end };
+    Ok((exposure, record(&result, ms)))
+}
+
+fn view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
+    let (width, height) = (image.width, image.height);
+    Ok(Frame {
+        timestamp: image.timestamp,
+        exposure: image.exposure_seconds,
+        colour: ColourView::new(&image.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,
+        depth: DepthView::new(&image.depth, width, height, width)?,
+        angular_velocity: None,
+    })
+}
+
+fn record(result: &FrameResult, ms: f64) -> FrameRecord {
+    let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
+    FrameRecord {
+        timestamp: result.timestamp,
+        status: match result.status {
+            mba_tracker::FrameStatus::Ok => FrameStatus::Ok,
+            mba_tracker::FrameStatus::Weak => FrameStatus::Weak,
+            mba_tracker::FrameStatus::Lost => FrameStatus::Lost,
+        },
+        keyframe: u8::from(result.is_keyframe),
+        ms,
+        blur_px: f64::from(result.blur),
+        virtual_views: count(result.virtual_views),
+        iterations: count(result.iterations),
+        residual: f64::from(result.residual),
+        inliers: f64::from(result.inliers),
+        gain: f64::from(result.brightness.gain),
+    }
+}
+
+/// The stand-in for a frame without a result: a camera that stays where it was.
+fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
+    let pose = last.map_or_else(RigidTransform::identity, |exposure| exposure.mid);
+    let exposure = TimedExposure { timestamp, start: pose, mid: pose, end: pose };
+    let record = FrameRecord {
+        timestamp,
+        status: FrameStatus::Lost,
+        keyframe: 0,
+        ms: f64::NAN,
+        blur_px: f64::NAN,
+        virtual_views: 0,
+        iterations: 0,
+        residual: f64::NAN,
+        inliers: 0.0,
+        gain: f64::NAN,
+    };
+    (exposure, record)
+}

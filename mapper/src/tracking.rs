@@ -5,7 +5,8 @@ use std::time::Instant;
 use mba_tracker::error::{ConfigError, FrameError as TrackError};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
-use mba_tracker::{Frame, FrameResult, ReferenceMode, SimdLevel, Tracker, TrackerConfig, workspace_len};
+use mba_tracker::trajectory::ExposureTrajectory;
+use mba_tracker::{Frame, FrameResult, ReferenceMode, SimdLevel, Tracker, TrackerConfig};
 
 use crate::dataset::{Dataset, FrameError, RgbdFrame};
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter};
@@ -48,6 +49,7 @@ pub fn tracker_config(dataset: &Dataset, options: &TrackingOptions) -> TrackerCo
     let calibration = dataset.calibration();
     let metres_per_unit = (1.0 / calibration.depth_scale) as f32;
     let mut config = TrackerConfig::new(calibration.camera, metres_per_unit, calibration.response.inverse());
+    config.region = dataset.region_with_source();
     config.reference = options.reference;
     config.align.blur = options.blur;
     config.align.depth_term = options.depth_term;
@@ -71,13 +73,21 @@ pub fn track_dataset(
 ) -> Result<(), TrackingError> {
     let config = tracker_config(dataset, options);
     config.validate().map_err(TrackingError::Camera)?;
-    let (width, height) = (config.camera.width, config.camera.height);
-    let mut memory = vec![0; workspace_len(width, height, config.levels, config.surface_level)];
+    let mut memory = vec![0; config.workspace_len()];
     let mut tracker = Tracker::new(&config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
+    // The tracker counts the frames it was given, the run those of the data set.
+    let mut given = Vec::with_capacity(dataset.len());
     for index in 0..dataset.len() {
         let record = match track_frame(&mut tracker, dataset, index) {
-            Ok((exposure, record)) => {
-                run.push(exposure, record)?;
+            Ok((result, ms)) => {
+                given.push(index);
+                if let Some(revision) = &result.revision {
+                    let revised = given.get(revision.index).copied().unwrap_or(index);
+                    let exposure = timed(dataset.timestamp(revised), &revision.world_from_camera);
+                    run.revise(revised, exposure, f64::from(revision.blur));
+                }
+                let record = record(&result, ms);
+                run.push(timed(result.timestamp, &result.world_from_camera), record)?;
                 record
             }
             Err(reason) => {
@@ -105,16 +115,16 @@ fn track_frame(
     tracker: &mut Tracker<'_>,
     dataset: &Dataset,
     index: usize,
-) -> Result<(TimedExposure, FrameRecord), SkipReason> {
+) -> Result<(FrameResult, f64), SkipReason> {
     let image = dataset.frame(index)?;
     let frame = view(&image)?;
     let begin = Instant::now();
     let result = tracker.track(&frame)?;
-    let ms = begin.elapsed().as_secs_f64() * 1e3;
-    let path = result.world_from_camera;
-    let exposure =
-        TimedExposure { timestamp: image.timestamp, start: path.start, mid: path.mid(), end: path.end };
-    Ok((exposure, record(&result, ms)))
+    Ok((result, begin.elapsed().as_secs_f64() * 1e3))
+}
+
+fn timed(timestamp: f64, path: &ExposureTrajectory) -> TimedExposure {
+    TimedExposure { timestamp, start: path.start, mid: path.mid(), end: path.end }
 }
 
 fn view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {

@@ -67,6 +67,16 @@ impl RunWriter {
         self.push(exposure, record)
     }
 
+    /// Replaces the exposure and the blur in pixels of frame `index`, counted from 0 in the order of pushing; nothing
+    /// happens if there is no such frame.
+    pub fn revise(&mut self, index: usize, exposure: TimedExposure, blur_px: f64) {
+        if let (Some(old), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
+            *old = exposure;
+            record.blur_px = blur_px;
+            self.unwritten += 1;
+        }
+    }
+
     /// Adds a sentence about the input to the summary.
     pub fn warn(&mut self, warning: String) {
         self.warnings.push(warning);
@@ -190,6 +200,21 @@ mod tests {
         assert!(header.starts_with(
             "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain\n"
         ));
+    }
+
+    #[test]
+    fn a_revised_frame_replaces_the_first_estimate() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        push(&mut writer, 0, FrameStatus::Ok);
+        push(&mut writer, 1, FrameStatus::Ok);
+        let better = TimedExposure { timestamp: 0.0, ..frame(7, FrameStatus::Ok).0 };
+        writer.revise(0, better, 6.5);
+        writer.revise(2, better, 1.0);
+        writer.finish(|_| ()).unwrap();
+        let run = Run::open(folder.path()).unwrap();
+        assert_eq!(run.exposures, [better, frame(1, FrameStatus::Ok).0]);
+        assert_eq!((run.frames[0].blur_px, run.frames[1].blur_px), (6.5, 2.0));
     }
 
     #[test]

@@ -1,0 +1,189 @@
+//! What a synthetic sequence is made of.
+
+use std::fmt;
+use std::str::FromStr;
+
+use mba_tracker::geometry::PinholeCamera;
+
+use super::SynthError;
+
+/// Settings of a synthetic sequence; the same settings give the same sequence, bit for bit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SynthConfig {
+    /// The world that is filmed.
+    pub scene: SceneName,
+    /// Number of frames, 1 to 100 000.
+    pub frames: usize,
+    /// Image width in pixels, 16 to 4096.
+    pub width: usize,
+    /// Image height in pixels, 16 to 4096.
+    pub height: usize,
+    /// Frames per second, 1 to 1000.
+    pub frame_rate: f64,
+    /// Time the shutter is open, seconds; above 0 and at most the frame interval.
+    pub exposure_seconds: f64,
+    /// Mean over pixels and frames of the distance in pixels between where a surface point is imaged at shutter
+    /// opening and at closing. The hand shake is scaled to meet it; 0 is a camera that stands still. At most an
+    /// eighth of the width.
+    pub mean_blur_px: f64,
+    /// Factor on the light before the response, above 0; 1 exposes the scenes well.
+    pub gain: f64,
+    /// How the stored values follow from light.
+    pub response: ResponseCurve,
+    /// Noise of the colour images; none for clean images.
+    pub noise: Option<NoiseModel>,
+    /// How depth is measured.
+    pub depth: DepthSensor,
+    /// Seed of hand shake and noise. The scenes are always the same.
+    pub seed: u64,
+}
+
+impl Default for SynthConfig {
+    fn default() -> Self {
+        Self {
+            scene: SceneName::Room,
+            frames: 90,
+            width: 640,
+            height: 480,
+            frame_rate: 30.0,
+            exposure_seconds: 0.016,
+            mean_blur_px: 8.0,
+            gain: 1.0,
+            response: ResponseCurve::Srgb,
+            noise: None,
+            depth: DepthSensor::Exact,
+            seed: 1,
+        }
+    }
+}
+
+/// The worlds that can be filmed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SceneName {
+    /// A furnished room, surfaces 0.8 to 6 m away.
+    Room,
+    /// A hall with rows of columns, surfaces 1.5 to 13 m away.
+    Hall,
+    /// One flat textured wall 2.5 m away: degenerate for depth alignment.
+    Wall,
+}
+
+/// How the stored 8-bit values follow from light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResponseCurve {
+    /// The sRGB transfer function (IEC 61966-2-1).
+    Srgb,
+    /// Proportional to light.
+    Linear,
+}
+
+/// How depth is measured, always at mid exposure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DepthSensor {
+    /// The true depth, rounded to the file's 0.2 mm.
+    Exact,
+    /// As a structured-light camera measures it: errors of constant size in disparity, correlated over a few
+    /// pixels, whole millimetres, holes at depth edges, at grazing angles and beyond 8 m.
+    StructuredLight,
+}
+
+/// Shot noise and read noise of an image sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NoiseModel {
+    /// Electrons of a pixel at full scale, above 0.
+    pub full_well: f64,
+    /// Standard deviation of the read noise in electrons, not negative.
+    pub read_noise: f64,
+}
+
+impl Default for NoiseModel {
+    /// A small-pixel video camera: 12 000 electrons full well, 5 electrons read noise.
+    fn default() -> Self {
+        Self { full_well: 12_000.0, read_noise: 5.0 }
+    }
+}
+
+impl SynthConfig {
+    /// The camera: focal length 500/640 of the width, principal point in the middle of the image.
+    #[must_use]
+    pub fn camera(&self) -> PinholeCamera {
+        let focal = 500.0 * self.width as f64 / 640.0;
+        PinholeCamera {
+            width: self.width,
+            height: self.height,
+            fx: focal,
+            fy: focal,
+            cx: (self.width as f64 - 1.0) / 2.0,
+            cy: (self.height as f64 - 1.0) / 2.0,
+        }
+    }
+
+    /// Checks every number.
+    pub(super) fn check(&self) -> Result<(), SynthError> {
+        let interval = 1.0 / self.frame_rate;
+        let longest_blur = self.width as f64 / 8.0;
+        let well = self.noise.map_or(1.0, |noise| noise.full_well);
+        let read = self.noise.map_or(0.0, |noise| noise.read_noise);
+        let checks = [
+            ("frames", self.frames as f64, 1.0..=1e5, "1 to 100000"),
+            ("width", self.width as f64, 16.0..=4096.0, "16 to 4096 pixels"),
+            ("height", self.height as f64, 16.0..=4096.0, "16 to 4096 pixels"),
+            ("frame rate", self.frame_rate, 1.0..=1000.0, "1 to 1000 frames per second"),
+            ("exposure", self.exposure_seconds, 1e-6..=interval, "1e-6 seconds to the frame interval"),
+            (
+                "mean blur",
+                self.mean_blur_px,
+                0.0..=longest_blur,
+                "0 to an eighth of the image width in pixels",
+            ),
+            ("gain", self.gain, 1e-6..=1e6, "1e-6 to 1e6"),
+            ("full well", well, 1.0..=1e9, "1 to 1e9 electrons"),
+            ("read noise", read, 0.0..=1e9, "0 to 1e9 electrons"),
+        ];
+        match checks.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
+            Some((setting, value, _, expected)) => Err(SynthError::Setting { setting, value, expected }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl ResponseCurve {
+    /// Name as in `calibration.toml`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Srgb => "srgb",
+            Self::Linear => "linear",
+        }
+    }
+}
+
+impl SceneName {
+    /// All scenes.
+    pub const ALL: [Self; 3] = [Self::Room, Self::Hall, Self::Wall];
+
+    /// Name in lower case, as [`FromStr`] reads it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Room => "room",
+            Self::Hall => "hall",
+            Self::Wall => "wall",
+        }
+    }
+}
+
+impl fmt::Display for SceneName {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(self.name())
+    }
+}
+
+impl FromStr for SceneName {
+    type Err = SynthError;
+
+    fn from_str(name: &str) -> Result<Self, SynthError> {
+        let known = Self::ALL.into_iter().find(|scene| scene.name() == name);
+        known.ok_or_else(|| SynthError::UnknownScene { name: name.to_owned() })
+    }
+}

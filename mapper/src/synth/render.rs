@@ -1,0 +1,124 @@
+//! Rays to linear light: sharp and motion-blurred images, depth.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::scene::{Hit, Ray, Scene};
+use super::view::View;
+
+/// Side of the square of pixels for which visible things are looked up together.
+const TILE: usize = 16;
+
+/// A view and how far from the pixel centres its rays pass.
+#[derive(Clone, Copy)]
+pub(super) struct SubFrame {
+    pub(super) view: View,
+    /// Columns and rows.
+    pub(super) offset: [f32; 2],
+}
+
+/// Size of an image in pixels.
+#[derive(Clone, Copy)]
+pub(super) struct Size {
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// `count` sampling positions within a pixel, evenly spread (Halton sequence) and zero on average, so that an
+/// image is not shifted.
+pub(super) fn jitter(count: usize) -> Vec<[f32; 2]> {
+    let points: Vec<[f64; 2]> = (1..=count).map(|k| [radical_inverse(k, 2), radical_inverse(k, 3)]).collect();
+    let mean = [0, 1].map(|axis| points.iter().map(|point| point[axis]).sum::<f64>() / count as f64);
+    points.iter().map(|point| [(point[0] - mean[0]) as f32, (point[1] - mean[1]) as f32]).collect()
+}
+
+/// The digits of `index` in `base`, mirrored at the point.
+fn radical_inverse(mut index: usize, base: usize) -> f64 {
+    let (mut value, mut digit) = (0.0, 1.0);
+    while index > 0 {
+        digit /= base as f64;
+        value += digit * (index % base) as f64;
+        index /= base;
+    }
+    value
+}
+
+/// Four positions on a turned grid for sharp images.
+pub(super) const TURNED_GRID: [[f32; 2]; 4] =
+    [[-0.125, -0.375], [0.375, -0.125], [0.125, 0.375], [-0.375, 0.125]];
+
+/// Mean linear RGB radiance over the sub-frames, row by row.
+pub(super) fn radiance(scene: &Scene, size: Size, sub_frames: &[SubFrame]) -> Vec<Vec3> {
+    let mut image = vec![Vec3::ZERO; size.width * size.height];
+    image.par_chunks_mut(size.width * TILE).enumerate().for_each(|(band, pixels)| {
+        let mut visible = Vec::new();
+        for left in (0..size.width).step_by(TILE) {
+            for sub_frame in sub_frames {
+                add_tile(scene, sub_frame, [left, band * TILE], size.width, pixels, &mut visible);
+            }
+        }
+        let share = 1.0 / sub_frames.len() as f32;
+        pixels.iter_mut().for_each(|pixel| *pixel *= share);
+    });
+    image
+}
+
+/// Adds one sub-frame to the tile at column and row `corner`; `band` is the tile's rows over the whole width.
+fn add_tile(
+    scene: &Scene,
+    sub_frame: &SubFrame,
+    corner: [usize; 2],
+    width: usize,
+    band: &mut [Vec3],
+    visible: &mut Vec<u16>,
+) {
+    let SubFrame { view, offset } = sub_frame;
+    let right = width.min(corner[0] + TILE);
+    cull_tile(scene, view, corner, visible);
+    for (row, pixels) in band.chunks_mut(width).enumerate() {
+        let v = (corner[1] + row) as f32 + offset[1];
+        for (column, pixel) in (corner[0]..right).zip(&mut pixels[corner[0]..right]) {
+            let ray = view.ray(column as f32 + offset[0], v);
+            let hit = scene.hit(&ray, visible);
+            *pixel += scene.radiance(&ray, &hit, view.pixel_angle);
+        }
+    }
+}
+
+fn cull_tile(scene: &Scene, view: &View, corner: [usize; 2], visible: &mut Vec<u16>) {
+    let [columns, rows] = corner.map(|first| [first as f32 - 1.0, (first + TILE) as f32]);
+    scene.cull(&view.cone(columns, rows), visible);
+}
+
+/// What a depth camera sees at a pixel.
+#[derive(Clone, Copy, Default)]
+pub(super) struct DepthSample {
+    /// Along the optical axis, metres.
+    pub(super) depth: f32,
+    /// Cosine of the angle between line of sight and surface normal.
+    pub(super) incidence: f32,
+}
+
+/// Depth and incidence through the pixel centres, row by row.
+pub(super) fn depth(scene: &Scene, size: Size, view: &View) -> Vec<DepthSample> {
+    let mut samples = vec![DepthSample::default(); size.width * size.height];
+    samples.par_chunks_mut(size.width * TILE).enumerate().for_each(|(band, samples)| {
+        let mut visible = Vec::new();
+        for left in (0..size.width).step_by(TILE) {
+            cull_tile(scene, view, [left, band * TILE], &mut visible);
+            let right = size.width.min(left + TILE);
+            for (row, samples) in samples.chunks_mut(size.width).enumerate() {
+                for (column, sample) in (left..right).zip(&mut samples[left..right]) {
+                    let ray = view.ray(column as f32, (band * TILE + row) as f32);
+                    *sample = depth_sample(scene, &ray, &scene.hit(&ray, &visible));
+                }
+            }
+        }
+    });
+    samples
+}
+
+fn depth_sample(scene: &Scene, ray: &Ray, hit: &Hit) -> DepthSample {
+    let cosine = ray.direction.dot(scene.normal(ray, hit)) / ray.direction.length();
+    DepthSample { depth: hit.distance, incidence: cosine.abs() }
+}

@@ -1,0 +1,190 @@
+//! A synthetic sequence as a data set on disk.
+
+use std::fmt::Write as _;
+use std::fs::{self, File};
+use std::io::BufWriter;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ImageBuffer, Luma, PixelWithColorType, Rgb};
+use rayon::prelude::*;
+
+use super::{BlurFigure, SynthError, SynthSequence, description};
+use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory};
+
+/// What was written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Summary {
+    /// Number of frames.
+    pub frames: usize,
+    /// Mean over the frames of their mean blur, pixels.
+    pub mean_blur_px: f64,
+    /// Largest 95th percentile of the blur of a frame, pixels.
+    pub largest_p95_px: f64,
+    /// Most sub-frames that were averaged into one frame.
+    pub most_sub_frames: usize,
+}
+
+/// Figures of one written frame.
+struct Written {
+    blur: BlurFigure,
+    sub_frames: usize,
+}
+
+/// Rate of the gyroscope samples, Hz.
+const GYRO_HERTZ: f64 = 200.0;
+
+/// Renders the sequence into `folder` in the native layout (TUM lists, `calibration.toml`) with ground truth,
+/// sharp images, blur figures, gyroscope rates and a README. Calls `progress(done, frames)` after each frame, from
+/// any thread and in any order.
+///
+/// The folder is made if it does not exist. The calibration is written last, so that a folder with it is complete.
+///
+/// # Errors
+///
+/// [`SynthError::FolderNotEmpty`], or a file that cannot be written; what was written so far stays.
+pub fn write_dataset(
+    sequence: &SynthSequence,
+    folder: &Path,
+    progress: impl Fn(usize, usize) + Sync,
+) -> Result<Summary, SynthError> {
+    prepare(folder)?;
+    let done = AtomicUsize::new(0);
+    let write_counted = |index| {
+        let written = write_frame(sequence, folder, index)?;
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.len());
+        Ok(written)
+    };
+    let written: Vec<_> =
+        (0..sequence.len()).into_par_iter().map(write_counted).collect::<Result<_, SynthError>>()?;
+    let summary = summarise(&written);
+    write_ground_truth(sequence, folder)?;
+    let texts = [
+        ("rgb.txt", image_list(sequence, "rgb")),
+        ("depth.txt", image_list(sequence, "depth")),
+        ("associations.txt", associations(sequence)),
+        ("blur.csv", blur_table(sequence, &written)),
+        ("gyro.csv", gyro_table(sequence)),
+        ("README.md", description::readme(sequence, &summary)),
+        ("calibration.toml", description::calibration(sequence)),
+    ];
+    for (name, text) in texts {
+        let path = folder.join(name);
+        fs::write(&path, text).map_err(|reason| SynthError::unwritable(path, reason))?;
+    }
+    Ok(summary)
+}
+
+fn prepare(folder: &Path) -> Result<(), SynthError> {
+    let unwritable = |reason| SynthError::unwritable(folder, reason);
+    fs::create_dir_all(folder).map_err(unwritable)?;
+    if fs::read_dir(folder).map_err(unwritable)?.next().is_some() {
+        return Err(SynthError::FolderNotEmpty { folder: folder.to_owned() });
+    }
+    for name in ["rgb", "depth", "sharp"] {
+        let path = folder.join(name);
+        fs::create_dir(&path).map_err(|reason| SynthError::unwritable(path, reason))?;
+    }
+    Ok(())
+}
+
+fn write_frame(sequence: &SynthSequence, folder: &Path, index: usize) -> Result<Written, SynthError> {
+    let frame = sequence.render_frame(index);
+    let path = |kind: &str| folder.join(kind).join(format!("{index:06}.png"));
+    let size = [frame.width, frame.height];
+    write_png::<Rgb<u8>>(&path("rgb"), size, frame.rgb)?;
+    write_png::<Luma<u16>>(&path("depth"), size, frame.depth)?;
+    write_png::<Rgb<u8>>(&path("sharp"), size, sequence.render_sharp(index))?;
+    Ok(Written { blur: frame.blur, sub_frames: frame.sub_frames })
+}
+
+fn write_png<P>(path: &Path, [width, height]: [usize; 2], values: Vec<P::Subpixel>) -> Result<(), SynthError>
+where
+    P: PixelWithColorType,
+    [P::Subpixel]: image::EncodableLayout,
+{
+    let file = File::create(path).map_err(|reason| SynthError::unwritable(path, reason))?;
+    let encoder =
+        PngEncoder::new_with_quality(BufWriter::new(file), CompressionType::Fast, FilterType::Adaptive);
+    let Some(image) = ImageBuffer::<P, _>::from_raw(width as u32, height as u32, values) else {
+        return Ok(());
+    };
+    let failed = |reason| SynthError::Image { path: path.to_owned(), reason };
+    image.write_with_encoder(encoder).map_err(failed)
+}
+
+fn summarise(written: &[Written]) -> Summary {
+    let mean = written.iter().map(|frame| frame.blur.mean_px).sum::<f64>() / written.len() as f64;
+    Summary {
+        frames: written.len(),
+        mean_blur_px: mean,
+        largest_p95_px: written.iter().map(|frame| frame.blur.p95_px).fold(0.0, f64::max),
+        most_sub_frames: written.iter().map(|frame| frame.sub_frames).max().unwrap_or(0),
+    }
+}
+
+fn write_ground_truth(sequence: &SynthSequence, folder: &Path) -> Result<(), SynthError> {
+    let exposure = |index: usize| {
+        let timestamp = sequence.timestamp(index);
+        let ends = sequence.exposure(index);
+        TimedExposure {
+            timestamp,
+            start: ends.start,
+            mid: sequence.world_from_camera(timestamp),
+            end: ends.end,
+        }
+    };
+    let exposures: Vec<_> = (0..sequence.len()).map(exposure).collect();
+    let pose = |exposure: &TimedExposure| TimedPose {
+        timestamp: exposure.timestamp,
+        world_from_camera: exposure.mid,
+    };
+    let poses: Vec<_> = exposures.iter().map(pose).collect();
+    write_trajectory(&folder.join("groundtruth.txt"), &poses)?;
+    write_exposures(&folder.join("groundtruth_exposure.txt"), &exposures)?;
+    Ok(())
+}
+
+/// `rgb.txt` or `depth.txt`. Writing to a string cannot fail.
+fn image_list(sequence: &SynthSequence, kind: &str) -> String {
+    let mut text = format!("# {kind} images\n# timestamp filename\n");
+    for index in 0..sequence.len() {
+        let _ = writeln!(text, "{:.6} {kind}/{index:06}.png", sequence.timestamp(index));
+    }
+    text
+}
+
+fn associations(sequence: &SynthSequence) -> String {
+    let mut text = String::new();
+    for index in 0..sequence.len() {
+        let time = sequence.timestamp(index);
+        let _ = writeln!(text, "{time:.6} rgb/{index:06}.png {time:.6} depth/{index:06}.png");
+    }
+    text
+}
+
+fn blur_table(sequence: &SynthSequence, written: &[Written]) -> String {
+    let mut text = String::from("frame,timestamp,exposure_s,mean_px,p95_px,subframes\n");
+    let exposure = sequence.config().exposure_seconds;
+    for (index, Written { blur, sub_frames }) in written.iter().enumerate() {
+        let BlurFigure { mean_px, p95_px, .. } = blur;
+        let time = sequence.timestamp(index);
+        let _ = writeln!(text, "{index},{time:.6},{exposure:.6},{mean_px:.3},{p95_px:.3},{sub_frames}");
+    }
+    text
+}
+
+/// Angular velocities in camera axes, from a tenth of a second before the first frame to as much after the last.
+fn gyro_table(sequence: &SynthSequence) -> String {
+    let mut text = String::from("timestamp,wx_rad_s,wy_rad_s,wz_rad_s\n");
+    let from = sequence.timestamp(0) - 0.1;
+    let until = sequence.timestamp(sequence.len() - 1) + 0.1;
+    let samples = ((until - from) * GYRO_HERTZ).round() as usize;
+    for sample in 0..=samples {
+        let time = from + sample as f64 / GYRO_HERTZ;
+        let rate = sequence.angular_velocity(time);
+        let _ = writeln!(text, "{time:.6},{:.9},{:.9},{:.9}", rate.x, rate.y, rate.z);
+    }
+    text
+}

@@ -225,6 +225,9 @@ fn check_sums_stay_finite(level: Level, scene: &TransferScene, views: &[VirtualV
     let want = reference::linearize(&problem, &scene.sites, &model, &mut patches);
     assert!((sums.pixels - want.pixels).abs() <= 4.0, "{} pixels instead of {}", sums.pixels, want.pixels);
     assert!(evaluate_cost(level, &problem, &scene.sites, &model, &mut patches).cost.is_finite());
+    let mut values = vec![PatchValues::default(); scene.sites.len()];
+    transfer_values(level, &problem, &scene.sites, &mut values);
+    assert!(values.iter().flat_map(|values| values.mean).all(f32::is_finite));
     let mut rows = vec![PatchRows::default(); scene.sites.len()];
     transfer_rows(level, &problem, &scene.sites, &mut rows);
     assert!(

@@ -58,7 +58,7 @@ pub struct TransferProblem<'a> {
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub struct PatchValues {
-    /// Mean reference intensity over the virtual views, per pattern pixel.
+    /// Mean reference intensity over the virtual views, per pattern pixel; zero where it is not valid.
     pub mean: [f32; PATCH_PIXELS],
     /// 1 where all virtual samples of the pixel were valid and the pixel lies in the current image, else 0.
     pub valid: [f32; PATCH_PIXELS],
@@ -76,7 +76,8 @@ impl Default for PatchValues {
 pub struct PatchRows {
     /// Predicted intensities.
     pub values: PatchValues,
-    /// Derivative of the mean by the twelve pose parameters (left rotations): `pose[column][pixel]`.
+    /// Derivative of the mean by the twelve pose parameters (left rotations): `pose[column][pixel]`; zero where
+    /// the pixel is not valid.
     pub pose: [[f32; PATCH_PIXELS]; 12],
 }
 

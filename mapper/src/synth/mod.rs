@@ -29,6 +29,8 @@ mod random;
 mod render;
 mod scene;
 mod sequence;
+#[cfg(test)]
+mod sequence_tests;
 mod view;
 mod writer;
 

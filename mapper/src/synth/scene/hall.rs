@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
 
-use super::lighting::{Lamp, Lighting};
+use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
 use super::{Enclosure, Scene, Sweep, Thing, shadows};
@@ -24,7 +24,7 @@ pub(super) fn build() -> Scene {
     let lighting = Lighting {
         from_above: Vec3::new(0.3, 0.31, 0.34),
         from_below: Vec3::new(0.15, 0.14, 0.13),
-        lamps: vec![lamp(0.0, -2.0), lamp(0.5, 2.5), lamp(-5.0, 3.0), lamp(5.0, 0.0)],
+        lamps: Lamps::new(&[lamp(0.0, -2.0), lamp(0.5, 2.5), lamp(-5.0, 3.0), lamp(5.0, 0.0)]),
         shadows: shadows(&things, &[0.9]),
     };
     Scene::assemble(walls(), things, lighting, sweep())

@@ -2,8 +2,8 @@
 //!
 //! A ray caster films analytic scenes with a camera that sweeps slowly and shakes. Each frame is the mean, in
 //! linear light, of many views within the exposure, so its blur is that of the true motion, which is smooth but
-//! not linear. Then come gain, noise, response and rounding. Equal settings give equal sequences bit for bit, for
-//! any number of threads.
+//! not linear. Then come gain, noise, response and rounding. On one machine equal settings give equal sequences bit
+//! for bit, for any number of threads.
 //!
 //! World y is up; camera x is right, y down, z forward; poses are `world_from_camera`; metres and seconds.
 //!

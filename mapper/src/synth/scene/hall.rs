@@ -48,7 +48,7 @@ fn walls() -> Enclosure {
 
 /// A column on a plinth under a capital.
 fn column(x: f32, z: f32, place: u32) -> [Thing; 3] {
-    let shaft = if place % 2 == 0 {
+    let shaft = if place.is_multiple_of(2) {
         Material::Marble { base: colour(0xd5cdbd), vein: colour(0x6d5a4c) }
     } else {
         Material::Rings { a: colour(0x9c5a42), b: colour(0xd9c3a0), width: 0.16 }

@@ -2,6 +2,9 @@
 
 use std::error::Error;
 use std::fmt;
+use std::io;
+
+use mba_mapper::run::RunError;
 
 /// Exit code of wrong use or bad input.
 pub const BAD_INPUT: u8 = 2;
@@ -68,10 +71,25 @@ pub fn message(error: &anyhow::Error) -> String {
             last = cause;
         }
     }
-    match error.downcast_ref::<BadInput>() {
-        Some(bad) if !bad.hint.is_empty() => format!("{text}\nhint: {}", bad.hint),
-        _ => text,
+    match hint(error) {
+        Some(hint) => format!("{text}\nhint: {hint}"),
+        None => text,
     }
+}
+
+fn hint(error: &anyhow::Error) -> Option<&str> {
+    if let Some(bad) = error.downcast_ref::<BadInput>() {
+        return (!bad.hint.is_empty()).then_some(&bad.hint);
+    }
+    is_disk_full(error).then_some("make room and start again; what had been finished before is still there")
+}
+
+fn is_disk_full(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        let io = cause.downcast_ref::<io::Error>().map(io::Error::kind);
+        matches!(cause.downcast_ref(), Some(RunError::DiskFull { .. }))
+            || io == Some(io::ErrorKind::StorageFull)
+    })
 }
 
 #[cfg(test)]

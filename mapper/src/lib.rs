@@ -7,5 +7,6 @@ pub mod run;
 mod text_lines;
 pub mod tracking;
 pub mod trajectory_file;
+mod whole_file;
 
 pub use error::FileError;

@@ -1,1 +1,3 @@
 //! Fixed-seed inputs shared by the benchmarks.
+
+pub mod transfer;

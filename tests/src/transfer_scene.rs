@@ -16,7 +16,7 @@ impl Uniform {
     /// The stream of `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self(Pcg32::new(seed, 0xa02b_dbf7_bb3c_0a7))
+        Self(Pcg32::new(seed, 0x0a02_bdbf_7bb3_c0a7))
     }
 
     /// A number in `[low, high)`.

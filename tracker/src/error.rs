@@ -28,6 +28,8 @@ pub enum FrameError {
         /// Timestamp of this frame, seconds.
         got: f64,
     },
+    /// A pose is not finite or its quaternion not of unit length.
+    Pose,
     /// The exposure time is negative or not finite.
     Exposure {
         /// Exposure in seconds.
@@ -45,6 +47,7 @@ impl fmt::Display for FrameError {
             Self::Timestamp { previous, got } => {
                 write!(f, "timestamp {got:.6} s does not follow {previous:.6} s")
             }
+            Self::Pose => f.write_str("pose is not finite or its quaternion not of unit length"),
             Self::Exposure { got } => write!(f, "exposure of {got} s is not a duration"),
         }
     }

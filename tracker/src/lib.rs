@@ -36,4 +36,7 @@ pub mod workspace;
 
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;
-pub use tracker::{Frame, FrameResult, FrameStatus, ReferenceMode, Tracker, TrackerConfig, workspace_len};
+pub use tracker::{
+    Frame, FrameResult, FrameStatus, ReferenceMode, ReferenceView, Revision, Tracker, TrackerConfig,
+    workspace_len,
+};

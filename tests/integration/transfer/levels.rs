@@ -5,8 +5,8 @@ use mba_tracker::simd::{Level, level_name, levels_up_to};
 use mba_tracker::trajectory::SampleRule;
 use mba_tracker::transfer::{
     PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PatchCost, PatchRows, PatchSite, PatchValues, PhotometricSums,
-    ROW_LENGTH, VirtualView, evaluate_cost, linearize, reference, transfer_pixel, transfer_rows,
-    transfer_values,
+    ROW_LENGTH, VirtualView, accumulate_rows, evaluate_cost, linearize, reference, transfer_pixel,
+    transfer_rows, transfer_values,
 };
 
 /// f32 places a sample within about 1.3e-4 px; gradients here stay below 0.15 per px. Rounding of the
@@ -17,8 +17,12 @@ const VALUE_TOLERANCE: f32 = 2e-5;
 /// the sample's position times the mixed second difference, and rounding.
 const ROW_TOLERANCE: f32 = 2e-4;
 
-/// Relative to `sqrt(H_ii H_jj)`. Some samples fall into different cells, where the interpolant has a kink.
-const NORMAL_TOLERANCE: f64 = 1e-4;
+/// Normal equations of the same rows, relative to `sqrt(H_ii H_jj)`: only the order of summation differs.
+const SUM_TOLERANCE: f64 = 2e-6;
+
+/// The same from the images on. A sample at a cell border may fall on either side of the kink there and change
+/// its row by a third; with fewer than 1000 pixels one such row is worth this much.
+const LINEARIZE_TOLERANCE: f64 = 1e-3;
 
 /// A sample nearer than this to an image border or a cell border may be judged differently, px.
 const BORDER: f64 = 1e-3;
@@ -123,39 +127,55 @@ fn rows_agree_with_the_oracle() {
     });
 }
 
-fn assert_sums_agree(got: &PhotometricSums, want: &PhotometricSums) {
+fn assert_sums_agree(got: &PhotometricSums, want: &PhotometricSums, tolerance: f64) {
     let scale = |i: usize| want.hessian[(i, i)].sqrt();
     let root_cost = (2.0 * want.cost).sqrt();
     for i in 0..ROW_LENGTH {
         let error = (got.gradient[i] - want.gradient[i]).abs() / (scale(i) * root_cost);
-        assert!(error < NORMAL_TOLERANCE, "gradient {i}: relative error {error:e}");
+        assert!(error < tolerance, "gradient {i}: relative error {error:e}");
         for j in 0..ROW_LENGTH {
             let error = (got.hessian[(i, j)] - want.hessian[(i, j)]).abs() / (scale(i) * scale(j));
-            assert!(error < NORMAL_TOLERANCE, "hessian {i},{j}: relative error {error:e}");
+            assert!(error < tolerance, "hessian {i},{j}: relative error {error:e}");
         }
     }
+    assert_eq!(got.pixels, want.pixels);
+    assert!((got.cost - want.cost).abs() < tolerance * want.cost);
 }
 
 #[test]
-fn normal_equations_agree_with_the_oracle() {
+fn sums_of_the_same_rows_agree_with_the_oracle() {
+    for_every_level_and_scene(|level, scene| {
+        let (problem, model) = (scene.problem(), TransferScene::residual_model());
+        let mut patches = vec![PatchCost::default(); scene.sites.len()];
+        let mut rows = vec![PatchRows::default(); scene.sites.len()];
+        for (site, rows) in scene.sites.iter().zip(&mut rows) {
+            reference::patch_rows(&problem, site, rows);
+        }
+        let want = reference::linearize(&problem, &scene.sites, &model, &mut patches);
+        let got = accumulate_rows(level, &problem, &scene.sites, &rows, &model, &mut patches);
+        assert_sums_agree(&got, &want, SUM_TOLERANCE);
+    });
+}
+
+#[test]
+fn linearisation_and_cost_agree_with_the_oracle() {
     for_every_level_and_scene(|level, scene| {
         // A pixel whose validity is a matter of rounding would change the sums.
         let sites: Vec<_> = scene.sites.iter().copied().filter(|site| decided(scene, site)).collect();
         let (problem, model) = (scene.problem(), TransferScene::residual_model());
-        let (mut got_patches, mut want_patches) = (vec![PatchCost::default(); sites.len()], Vec::new());
-        want_patches.clone_from(&got_patches);
+        let mut want_patches = vec![PatchCost::default(); sites.len()];
+        let mut got_patches = want_patches.clone();
         let want = reference::linearize(&problem, &sites, &model, &mut want_patches);
         let got = linearize(level, &problem, &sites, &model, &mut got_patches);
-        assert_sums_agree(&got, &want);
-        assert_eq!(got.pixels, want.pixels);
-        assert!((got.cost - want.cost).abs() < 1e-4 * want.cost);
-        let cost = evaluate_cost(level, &problem, &sites, &model, &mut want_patches);
-        assert!((f64::from(cost.cost) - got.cost).abs() < 1e-5 * got.cost);
-        assert_eq!(f64::from(cost.pixels), got.pixels);
+        assert_sums_agree(&got, &want, LINEARIZE_TOLERANCE);
         for (got, want) in got_patches.iter().zip(&want_patches) {
             assert!((got.cost - want.cost).abs() <= 1e-4 * want.cost.max(1e-3), "{got:?} {want:?}");
             assert_eq!(got.pixels, want.pixels);
         }
+        let cost = evaluate_cost(level, &problem, &sites, &model, &mut want_patches);
+        assert_eq!(want_patches, got_patches, "evaluate_cost and linearize disagree");
+        assert!((f64::from(cost.cost) - got.cost).abs() < 1e-6 * got.cost);
+        assert_eq!(f64::from(cost.pixels), got.pixels);
     });
 }
 

@@ -5,13 +5,14 @@
 //! the keyframe's map. The normal of the surface enters through the slopes of the fitted planes, which makes this
 //! the point-to-plane distance in units in which the sensor's noise is uniform.
 
+use fearless_simd::{Level, dispatch, prelude::*};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use super::depth_accumulate::DepthBatch;
 use super::scale::{SIGMA_PER_MEDIAN_ABSOLUTE, median};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::math::round_half_up_to_i32;
 use crate::surface::{InverseDepthMap, SurfacePlanes, spread_limit};
-use crate::transfer::huber;
 
 /// Inputs of the depth term.
 #[derive(Clone, Copy, Debug)]
@@ -69,27 +70,40 @@ impl DepthProblem<'_> {
     }
 
     /// Robust cost and normal equations at `keyframe_from_camera` (mid exposure) for residuals of standard
-    /// deviation `sigma`.
+    /// deviation `sigma`, with Huber threshold `delta` in standard deviations.
     #[must_use]
-    pub fn linearise(&self, keyframe_from_camera: &RigidTransform, sigma: f32, delta: f32) -> DepthSums {
+    pub fn linearise(
+        &self,
+        level: Level,
+        keyframe_from_camera: &RigidTransform,
+        sigma: f32,
+        delta: f32,
+    ) -> DepthSums {
+        dispatch!(level, simd => self.sum_up(simd, keyframe_from_camera, sigma, delta))
+    }
+
+    #[inline(always)]
+    fn sum_up<S: Simd>(
+        &self,
+        simd: S,
+        keyframe_from_camera: &RigidTransform,
+        sigma: f32,
+        delta: f32,
+    ) -> DepthSums {
         let mut sums =
             DepthSums { cost: 0.0, points: 0.0, hessian: Matrix6::zeros(), gradient: Vector6::zeros() };
+        let mut batch = DepthBatch::new(delta);
         let inverse_sigma = 1.0 / sigma;
-        let mut row_sums = RowSums::default();
-        let mut in_block = 0;
         self.for_each_sample(keyframe_from_camera, |sample| {
-            row_sums.add(&sample, inverse_sigma, delta);
-            in_block += 1;
-            if in_block == FLUSH_INTERVAL {
-                row_sums.flush(&mut sums);
-                in_block = 0;
-            }
+            let (normal, residual) = (sample.normal * inverse_sigma, sample.residual * inverse_sigma);
+            batch.push(simd, normal, sample.arm, residual, &mut sums);
         });
-        row_sums.flush(&mut sums);
+        batch.flush(simd, &mut sums);
         sums.hessian.fill_lower_triangle_with_upper_triangle();
         sums
     }
 
+    #[inline(always)]
     fn for_each_sample(&self, keyframe_from_camera: &RigidTransform, mut visit: impl FnMut(DepthSample)) {
         let rotation = keyframe_from_camera.rotation_matrix().map(|x| x as f32);
         let position = keyframe_from_camera.translation.map(|x| x as f32);
@@ -129,50 +143,6 @@ impl DepthProblem<'_> {
                 visit(DepthSample { residual, normal, arm });
             }
         }
-    }
-}
-
-/// Single-precision sums are moved to double precision after this many points.
-const FLUSH_INTERVAL: usize = 64;
-
-/// Sums of a short run of points in single precision.
-#[derive(Default)]
-struct RowSums {
-    cost: f32,
-    points: f32,
-    gradient: [f32; 6],
-    hessian: [[f32; 6]; 6],
-}
-
-impl RowSums {
-    #[inline]
-    fn add(&mut self, sample: &DepthSample, inverse_sigma: f32, delta: f32) {
-        let residual = sample.residual * inverse_sigma;
-        let (cost, weight) = huber(residual, delta);
-        self.cost += cost;
-        self.points += 1.0;
-        let normal = sample.normal * inverse_sigma;
-        let turn = sample.arm.cross(&normal);
-        let row = [normal.x, normal.y, normal.z, turn.x, turn.y, turn.z];
-        for i in 0..6 {
-            let weighted = weight * row[i];
-            self.gradient[i] += weighted * residual;
-            for j in i..6 {
-                self.hessian[i][j] += weighted * row[j];
-            }
-        }
-    }
-
-    fn flush(&mut self, sums: &mut DepthSums) {
-        sums.cost += f64::from(self.cost);
-        sums.points += f64::from(self.points);
-        for i in 0..6 {
-            sums.gradient[i] += f64::from(self.gradient[i]);
-            for j in i..6 {
-                sums.hessian[(i, j)] += f64::from(self.hessian[i][j]);
-            }
-        }
-        *self = Self::default();
     }
 }
 

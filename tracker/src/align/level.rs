@@ -1,18 +1,18 @@
-//! Levenberg-Marquardt on one pyramid level.
+//! Alignment on one pyramid level.
 
 use fearless_simd::Level;
 use nalgebra::{SMatrix, SVector, Vector6};
 
-use super::depth_term::{DepthProblem, gate_for};
+use super::damping::Damping;
+use super::measure::{NOMINAL_PHOTON_VARIANCE, measure_depth, measure_photometric, nominal_model};
 use super::objective::{AlignScratch, FrameData, Linearised, Objective, ReferenceData};
 use super::placement::{blur_length, place_sites};
 use super::prior::MotionPrior;
-use super::scale::median;
 use super::{AlignSettings, Estimate, UNKNOWNS};
 use crate::geometry::PinholeCamera;
+use crate::keyframe::Keypoint;
 use crate::math::sqrt_f32;
-use crate::trajectory::SampleRule;
-use crate::transfer::{self, BrightnessModel, PatchCost, ResidualModel, virtual_views};
+use crate::transfer::BrightnessModel;
 
 /// Why iterations on a level ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,23 +52,33 @@ pub struct LevelOutcome {
     pub depth_points: usize,
     /// Gauss-Newton matrix at the estimate in (centre, motion, gain, offset) coordinates.
     pub information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-    /// Objective at the estimate.
-    pub cost: f64,
 }
 
-/// Fewest patches or depth points for an alignment.
-const MIN_PATCHES: usize = 8;
-const MIN_DEPTH_POINTS: usize = 60;
-
-/// Nominal variance per unit of light; the measured scale multiplies it.
-const NOMINAL_PHOTON_VARIANCE: f32 = 1e-4;
+impl LevelOutcome {
+    /// The outcome of doing nothing.
+    #[must_use]
+    pub fn unchanged(estimate: Estimate) -> Self {
+        Self {
+            estimate,
+            stop: StopReason::NoData,
+            iterations: 0,
+            views: 1,
+            photometric_scale: 0.0,
+            depth_scale: 0.0,
+            patches: 0,
+            patches_in_view: 0,
+            depth_points: 0,
+            information: SMatrix::zeros(),
+        }
+    }
+}
 
 /// What all levels of one alignment share.
 #[derive(Clone, Copy, Debug)]
 pub struct Alignment<'a> {
     /// Instruction set of the kernels.
     pub simd: Level,
-    /// Intrinsics of the full-resolution images.
+    /// Intrinsics of the finest level.
     pub camera: PinholeCamera,
     /// What the frame is aligned with.
     pub reference: ReferenceData<'a>,
@@ -80,244 +90,191 @@ pub struct Alignment<'a> {
     pub settings: &'a AlignSettings,
 }
 
-/// Aligns a frame on pyramid level `level`, starting from `initial`; the depth term takes every `depth_stride`-th
-/// row and column.
-pub fn align_level(
-    alignment: &Alignment,
-    level: usize,
-    initial: Estimate,
-    prior: &MotionPrior,
-    depth_stride: usize,
-    scratch: &mut AlignScratch,
-) -> LevelOutcome {
-    let Alignment { camera, reference, frame, settings, .. } = *alignment;
-    let level_camera = camera.at_level(level);
-    let mut outcome = LevelOutcome {
-        estimate: initial,
-        stop: StopReason::NoData,
-        iterations: 0,
-        views: 1,
-        photometric_scale: 0.0,
-        depth_scale: 0.0,
-        patches: 0,
-        patches_in_view: 0,
-        depth_points: 0,
-        information: SMatrix::zeros(),
-        cost: 0.0,
-    };
-    let mut damping = 1e-4;
-    let mut growth = 2.0;
-    let keypoints = reference.keypoints[level];
-    'placements: while outcome.iterations < settings.max_iterations {
+/// What may differ from level to level.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelPlan {
+    /// Pyramid level.
+    pub level: usize,
+    /// The depth term takes every n-th row and column.
+    pub depth_stride: usize,
+    /// Linearisations at the most.
+    pub max_iterations: usize,
+    /// Iterations stop when a step moves the image by less than this many pixels of the level.
+    pub min_step: f64,
+    /// Whether the motion during the exposure is sampled; otherwise one view at mid exposure.
+    pub blur: bool,
+}
+
+/// Fewest patches for an alignment without depth.
+const MIN_PATCHES: usize = 8;
+
+/// Patches are placed anew after the image moved by this many pixels of the level.
+const REPLACE_AFTER: f64 = 0.7;
+
+/// Least ratio of actual to predicted decrease for a step to count.
+const MIN_GAIN_RATIO: f64 = 1e-3;
+
+impl Alignment<'_> {
+    /// Aligns the frame on one level, starting from `initial`.
+    pub fn align_level(
+        &self,
+        plan: &LevelPlan,
+        initial: Estimate,
+        prior: &MotionPrior,
+        scratch: &mut AlignScratch,
+    ) -> LevelOutcome {
+        let mut outcome = LevelOutcome::unchanged(initial);
+        let mut damping = Damping::default();
+        loop {
+            let (objective, kept) = self.place(plan, prior, &mut outcome, scratch);
+            if kept < MIN_PATCHES && objective.depth.is_none() {
+                outcome.stop = StopReason::NoData;
+                return outcome;
+            }
+            let objective = Objective { sites: &scratch.sites[..kept], ..objective };
+            let costs = &mut scratch.costs[..kept];
+            match descend(&objective, plan, &mut damping, &mut outcome, costs) {
+                Descent::Stopped(stop) => {
+                    outcome.stop = stop;
+                    return outcome;
+                }
+                Descent::Moved => {}
+            }
+        }
+    }
+
+    /// Places the patches at the current estimate and measures noise and outliers; returns the objective without
+    /// its sites and their number.
+    fn place(
+        &self,
+        plan: &LevelPlan,
+        prior: &MotionPrior,
+        outcome: &mut LevelOutcome,
+        scratch: &mut AlignScratch,
+    ) -> (Objective<'_>, usize) {
         let estimate = outcome.estimate;
+        let camera = self.camera.at_level(plan.level);
+        let keypoints = self.reference.keypoints[plan.level];
         let in_view = place_sites(
             &estimate.keyframe_from_camera,
             keypoints,
-            &level_camera,
-            level,
-            frame.depth,
+            &camera,
+            plan.level,
+            &self.frame,
             scratch.sites,
         );
-        let blur = blur_length(&estimate.keyframe_from_camera, keypoints, &level_camera);
-        let views = if settings.blur { view_count(blur, settings) } else { 1 };
+        let blur = blur_length(&estimate.keyframe_from_camera, keypoints, &camera);
         let mut objective = Objective {
-            camera: level_camera,
-            level,
-            simd: alignment.simd,
-            reference,
-            frame,
+            simd: self.simd,
+            camera,
+            depth_camera: self.camera.at_level(self.frame.depth_level),
+            level: plan.level,
+            reference: self.reference,
+            frame: self.frame,
             sites: &[],
-            views,
-            model: nominal_model(settings),
-            photometric_weight: 0.0,
+            views: if plan.blur { view_count(blur, self.settings) } else { 1 },
+            model: nominal_model(self.settings),
             depth: None,
             prior: *prior,
-            expected_brightness: alignment.expected_brightness,
-            settings,
+            expected_brightness: self.expected_brightness,
+            inverse_depth: median_inverse_depth(keypoints),
+            settings: self.settings,
         };
         let kept = measure_photometric(&mut objective, &estimate, in_view, scratch);
-        if settings.depth_term {
-            measure_depth(&mut objective, &camera, &estimate, depth_stride, scratch.medians);
+        if self.settings.depth_term {
+            objective.depth = measure_depth(&objective, &estimate, plan.depth_stride, scratch.medians);
         }
-        objective.sites = &scratch.sites[..kept];
-        outcome.views = views;
+        outcome.views = objective.views;
         outcome.patches = kept;
         outcome.patches_in_view = in_view;
         outcome.photometric_scale = sqrt_f32(objective.model.photon_variance / NOMINAL_PHOTON_VARIANCE);
-        outcome.depth_scale = objective.depth.as_ref().map_or(0.0, |depth| depth.1);
-        if kept < MIN_PATCHES && objective.depth.is_none() {
-            outcome.stop = StopReason::NoData;
-            return outcome;
-        }
-        let mut at = objective.linearise(&estimate, None, &mut scratch.costs[..kept]);
-        outcome.iterations += 1;
-        let mut moved = 0.0;
-        loop {
-            outcome.information = at.hessian;
-            outcome.cost = at.cost;
-            outcome.depth_points = at.depth_points as usize;
-            let Some(step) = damped_step(&at, damping) else {
-                outcome.stop = StopReason::Singular;
-                return outcome;
-            };
-            let pixels = step_in_pixels(&step, &level_camera, median_inverse_depth(keypoints));
-            if pixels < settings.min_step {
-                outcome.estimate = outcome.estimate.stepped(&step);
-                outcome.stop = StopReason::SmallStep;
-                return outcome;
-            }
-            if outcome.iterations >= settings.max_iterations {
-                outcome.stop = StopReason::IterationLimit;
-                return outcome;
-            }
-            let candidate = outcome.estimate.stepped(&step);
-            let next = objective.linearise(
-                &candidate,
-                Some((at.pixels, at.depth_points)),
-                &mut scratch.costs[..kept],
-            );
-            outcome.iterations += 1;
-            let predicted = -at.gradient.dot(&step) - 0.5 * step.dot(&(at.hessian * step));
-            let ratio = (at.cost - next.cost) / predicted.max(f64::MIN_POSITIVE);
-            if next.cost.is_finite() && next.cost < at.cost && ratio > 1e-3 {
-                let shrink = 1.0 - (2.0 * ratio - 1.0) * (2.0 * ratio - 1.0) * (2.0 * ratio - 1.0);
-                damping = (damping * shrink.max(1.0 / 3.0)).max(1e-9);
-                growth = 2.0;
-                outcome.estimate = candidate;
-                moved += pixels;
-                at = next;
-                if moved > 0.7 {
-                    continue 'placements;
-                }
-            } else {
-                damping *= growth;
-                growth *= 2.0;
-                if damping > 1e4 {
-                    outcome.stop = StopReason::NoDecrease;
-                    return outcome;
-                }
-            }
-        }
+        outcome.depth_scale = objective.depth.as_ref().map_or(0.0, |depth| depth.sigma);
+        (objective, kept)
     }
-    outcome.stop = StopReason::IterationLimit;
-    outcome
 }
 
-fn nominal_model(settings: &AlignSettings) -> ResidualModel {
-    ResidualModel {
-        read_variance: NOMINAL_PHOTON_VARIANCE * settings.dark_intensity,
-        photon_variance: NOMINAL_PHOTON_VARIANCE,
-        huber: settings.huber,
+/// How a run of steps with fixed patches ended.
+enum Descent {
+    /// For good.
+    Stopped(StopReason),
+    /// The image moved so far that the patches should be placed anew.
+    Moved,
+}
+
+/// Steps downhill with fixed patches. Every candidate is linearised at once: most are accepted, and then the next
+/// step needs no further evaluation.
+fn descend(
+    objective: &Objective,
+    plan: &LevelPlan,
+    damping: &mut Damping,
+    outcome: &mut LevelOutcome,
+    costs: &mut [crate::transfer::PatchCost],
+) -> Descent {
+    let mut at = objective.linearise(&outcome.estimate, None, costs);
+    outcome.iterations += 1;
+    let mut moved = 0.0;
+    loop {
+        outcome.information = at.hessian;
+        outcome.depth_points = at.depth_points as usize;
+        let Some(step) = damping.step(&at.hessian, &at.gradient) else {
+            return Descent::Stopped(StopReason::Singular);
+        };
+        let pixels = step_in_pixels(&step, &objective.camera, objective.inverse_depth);
+        if pixels < plan.min_step {
+            outcome.estimate = outcome.estimate.stepped(&step);
+            return Descent::Stopped(StopReason::SmallStep);
+        }
+        if outcome.iterations >= plan.max_iterations {
+            return Descent::Stopped(StopReason::IterationLimit);
+        }
+        let candidate = outcome.estimate.stepped(&step);
+        let next = objective.linearise(&candidate, Some((at.pixels, at.depth_points)), costs);
+        outcome.iterations += 1;
+        let ratio = gain_ratio(&at, &next, &step);
+        if next.cost < at.cost && ratio > MIN_GAIN_RATIO {
+            damping.accept(ratio);
+            outcome.estimate = candidate;
+            at = next;
+            moved += pixels;
+            if moved > REPLACE_AFTER && outcome.iterations < plan.max_iterations {
+                return Descent::Moved;
+            }
+        } else if !damping.reject() {
+            return Descent::Stopped(StopReason::NoDecrease);
+        }
     }
+}
+
+/// Actual over predicted decrease; NaN when the candidate has no finite cost.
+fn gain_ratio(at: &Linearised, next: &Linearised, step: &SVector<f64, UNKNOWNS>) -> f64 {
+    let predicted = -at.gradient.dot(step) - 0.5 * step.dot(&(at.hessian * step));
+    (at.cost - next.cost) / predicted.max(f64::MIN_POSITIVE)
 }
 
 /// Virtual views for a blur of `blur` pixels.
 fn view_count(blur: f32, settings: &AlignSettings) -> usize {
-    if blur < 0.5 {
+    if blur < MIN_SAMPLED_BLUR {
         return 1;
     }
     let wanted = (blur / settings.view_spacing) as usize + 1;
-    wanted.clamp(3, settings.max_views.max(1))
+    wanted.clamp(3, settings.max_views.max(3))
 }
 
-/// Measures the photometric noise scale at `estimate`, drops outlier patches and sets the term's weight; returns
-/// the number of patches kept, which are moved to the front of the scratch.
-fn measure_photometric(
-    objective: &mut Objective,
-    estimate: &Estimate,
-    in_view: usize,
-    scratch: &mut AlignScratch,
-) -> usize {
-    let views = virtual_views(
-        &estimate.keyframe_from_camera,
-        objective.views,
-        SampleRule::Midpoint,
-        &objective.camera,
-    );
-    // Without a threshold the mean cost of a patch is half its mean square.
-    let square_model = ResidualModel { huber: f32::MAX, ..objective.model };
-    let problem = objective.transfer_problem(estimate, &views);
-    transfer::evaluate_cost(
-        objective.simd,
-        &problem,
-        &scratch.sites[..in_view],
-        &square_model,
-        &mut scratch.costs[..in_view],
-    );
-    let mean_cost = |c: &PatchCost| if c.pixels > 0.0 { c.cost / c.pixels } else { f32::MAX };
-    let mut count = 0;
-    for cost in &scratch.costs[..in_view] {
-        if cost.pixels > 0.0 {
-            scratch.medians[count] = mean_cost(cost);
-            count += 1;
-        }
-    }
-    let typical = median(&mut scratch.medians[..count]).max(1e-3);
-    let mut kept = 0;
-    for k in 0..in_view {
-        if mean_cost(&scratch.costs[k]) < objective.settings.outlier_factor * typical {
-            scratch.sites[kept] = scratch.sites[k];
-            kept += 1;
-        }
-    }
-    // Half the mean square is half the variance.
-    let variance_scale = 2.0 * typical;
-    objective.model.read_variance *= variance_scale;
-    objective.model.photon_variance *= variance_scale;
-    objective.photometric_weight = 1.0 / objective.settings.photometric_correlation;
-    kept
-}
-
-/// Measures the depth noise scale at `estimate` and sets up the depth term where enough points overlap.
-fn measure_depth<'a>(
-    objective: &mut Objective<'a>,
-    camera: &PinholeCamera,
-    estimate: &Estimate,
-    stride: usize,
-    medians: &mut [f32],
-) {
-    let mut problem = DepthProblem {
-        current: objective.frame.depth,
-        keyframe: objective.reference.depth,
-        planes: objective.reference.planes,
-        camera: camera.at_level(objective.reference.depth.level),
-        stride: stride * 2,
-        gate: gate_for(f32::MAX),
-    };
-    let (sigma, count) = problem.noise_scale(&estimate.keyframe_from_camera.mid(), medians);
-    if count * 4 < MIN_DEPTH_POINTS * 4 / (stride * stride) {
-        return;
-    }
-    let sigma = sigma.max(objective.settings.min_depth_sigma);
-    problem.stride = stride;
-    problem.gate = gate_for(sigma);
-    let weight =
-        (stride * stride) as f64 / objective.settings.depth_correlation.max((stride * stride) as f64);
-    objective.depth = Some((problem, sigma, weight));
-}
-
-/// Solves the damped normal equations: `(H + mu D) step = -g`.
-fn damped_step(at: &Linearised, damping: f64) -> Option<SVector<f64, UNKNOWNS>> {
-    let mut damped = at.hessian;
-    let floor = 1e-9 * at.hessian.trace() / UNKNOWNS as f64;
-    for i in 0..UNKNOWNS {
-        damped[(i, i)] += damping * at.hessian[(i, i)] + floor;
-    }
-    let step = damped.cholesky()?.solve(&-at.gradient);
-    step.iter().all(|x| x.is_finite()).then_some(step)
-}
+/// Blur in pixels below which one view serves: the motion is not observable there.
+const MIN_SAMPLED_BLUR: f32 = 0.5;
 
 /// Largest image motion in pixels that a step causes at the scene's typical depth.
 fn step_in_pixels(step: &SVector<f64, UNKNOWNS>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
-    let centre = pixels_of(&step.fixed_rows::<6>(0).into_owned(), camera, inverse_depth);
-    let motion = pixels_of(&step.fixed_rows::<6>(6).into_owned(), camera, inverse_depth);
+    let pixels = |tangent: Vector6<f64>| {
+        let translation = tangent.fixed_rows::<3>(0).norm() * inverse_depth;
+        camera.fx * translation.max(tangent.fixed_rows::<3>(3).norm())
+    };
+    let centre = pixels(step.fixed_rows::<6>(0).into_owned());
+    let motion = pixels(step.fixed_rows::<6>(6).into_owned());
     centre.max(0.5 * motion)
 }
 
-fn pixels_of(tangent: &Vector6<f64>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
-    camera.fx * (tangent.fixed_rows::<3>(0).norm() * inverse_depth).max(tangent.fixed_rows::<3>(3).norm())
-}
-
-fn median_inverse_depth(keypoints: &[crate::keyframe::Keypoint]) -> f64 {
+/// Inverse depth of the keypoint in the middle of the list, which is near the middle of the image.
+pub(super) fn median_inverse_depth(keypoints: &[Keypoint]) -> f64 {
     keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
 }

@@ -8,16 +8,19 @@
 //! Each data term is divided by its own robust noise scale, measured at the current estimate, so exact depth
 //! dominates where it is exact and a blurred reference loses weight where it does not fit.
 
+mod damping;
+mod depth_accumulate;
 pub mod depth_term;
 mod level;
+mod measure;
 mod objective;
 mod placement;
 mod prior;
 mod scale;
 mod settings;
 
-pub use level::{Alignment, LevelOutcome, StopReason, align_level};
-pub use objective::{AlignScratch, FrameData, Linearised, ReferenceData};
+pub use level::{Alignment, LevelOutcome, LevelPlan, StopReason};
+pub use objective::{AlignScratch, FrameData, ReferenceData};
 pub use placement::{blur_length, place_sites};
 pub use prior::MotionPrior;
 pub use settings::AlignSettings;

@@ -7,7 +7,7 @@ use super::depth_term::DepthProblem;
 use super::prior::MotionPrior;
 use super::{AlignSettings, Estimate, UNKNOWNS};
 use crate::geometry::PinholeCamera;
-use crate::image::GreyPyramid;
+use crate::image::{GreyLevel, PixelRectangle};
 use crate::keyframe::Keypoint;
 use crate::surface::{InverseDepthMap, SurfacePlanes};
 use crate::trajectory::{ExposureTrajectory, SampleRule};
@@ -19,9 +19,9 @@ use crate::transfer::{
 /// The sharp reference that a frame is aligned with.
 #[derive(Clone, Copy, Debug)]
 pub struct ReferenceData<'a> {
-    /// Sharp image.
-    pub pyramid: &'a GreyPyramid<'a>,
-    /// Keypoints of every level of the pyramid.
+    /// Sharp image, finest level first.
+    pub levels: &'a [GreyLevel<'a>],
+    /// Keypoints of every level.
     pub keypoints: &'a [&'a [Keypoint]],
     /// Inverse depth.
     pub depth: &'a InverseDepthMap<'a>,
@@ -32,10 +32,14 @@ pub struct ReferenceData<'a> {
 /// The frame that is aligned.
 #[derive(Clone, Copy, Debug)]
 pub struct FrameData<'a> {
-    /// Blurred image.
-    pub pyramid: &'a GreyPyramid<'a>,
+    /// Blurred image, finest level first.
+    pub levels: &'a [GreyLevel<'a>],
     /// Inverse depth at mid exposure.
     pub depth: &'a InverseDepthMap<'a>,
+    /// Which of `levels` has the size of `depth`.
+    pub depth_level: usize,
+    /// Part of `levels[0]` that holds data.
+    pub region: PixelRectangle,
 }
 
 /// Memory that an alignment works in.
@@ -49,34 +53,45 @@ pub struct AlignScratch<'m> {
     pub medians: &'m mut [f32],
 }
 
+/// The depth term with its measured noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct DepthPart<'a> {
+    pub(super) problem: DepthProblem<'a>,
+    /// Robust standard deviation, 1/m.
+    pub(super) sigma: f32,
+    /// Independent measurements per point.
+    pub(super) weight: f64,
+}
+
 /// Everything that stays fixed while steps on one level are tried out.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Objective<'a> {
-    pub simd: Level,
-    pub camera: PinholeCamera,
-    pub level: usize,
-    pub reference: ReferenceData<'a>,
-    pub frame: FrameData<'a>,
-    pub sites: &'a [PatchSite],
-    pub views: usize,
-    pub model: ResidualModel,
-    pub photometric_weight: f64,
-    pub depth: Option<(DepthProblem<'a>, f32, f64)>,
-    pub prior: MotionPrior,
-    pub expected_brightness: BrightnessModel,
-    pub settings: &'a AlignSettings,
+    pub(super) simd: Level,
+    pub(super) camera: PinholeCamera,
+    pub(super) depth_camera: PinholeCamera,
+    pub(super) level: usize,
+    pub(super) reference: ReferenceData<'a>,
+    pub(super) frame: FrameData<'a>,
+    pub(super) sites: &'a [PatchSite],
+    pub(super) views: usize,
+    pub(super) model: ResidualModel,
+    pub(super) depth: Option<DepthPart<'a>>,
+    pub(super) prior: MotionPrior,
+    pub(super) expected_brightness: BrightnessModel,
+    /// Typical inverse depth of the scene, 1/m.
+    pub(super) inverse_depth: f64,
+    pub(super) settings: &'a AlignSettings,
 }
 
 /// Cost and normal equations at an estimate, in the coordinates of [`Estimate::stepped`].
 #[derive(Clone, Debug)]
-pub struct Linearised {
+pub(super) struct Linearised {
     /// Value of the objective.
     pub cost: f64,
     /// Gauss-Newton matrix.
     pub hessian: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     /// Gradient.
     pub gradient: SVector<f64, UNKNOWNS>,
-    /// Mean photometric cost per pixel, squared standard deviations.
-    pub photometric_cost: f64,
     /// Photometric pixels that took part.
     pub pixels: f64,
     /// Depth points that took part.
@@ -95,38 +110,46 @@ impl Objective<'_> {
         let trajectory = &estimate.keyframe_from_camera;
         let photometric = self.photometric(estimate, costs);
         let pixels = photometric.pixels;
-        let scale = |count: f64, expected: f64| if count > 0.0 { expected / count } else { 1.0 };
-        let (expected_pixels, expected_points) = expected_counts.unwrap_or((pixels, -1.0));
-        let weight = self.photometric_weight * scale(pixels, expected_pixels);
-        let mut cost = weight * photometric.cost;
-        let mut hessian = photometric.hessian * weight;
-        let mut gradient = photometric.gradient * weight;
-        let mut depth_points = 0.0;
-        if let Some((problem, sigma, depth_weight)) = &self.depth {
-            let sums = problem.linearise(&trajectory.mid(), *sigma, self.settings.huber);
-            depth_points = sums.points;
-            let expected = if expected_points < 0.0 { sums.points } else { expected_points };
-            let weight = depth_weight * scale(sums.points, expected);
-            cost += weight * sums.cost;
-            let to_ends = mid_from_ends(trajectory);
-            let h = to_ends.transpose() * sums.hessian * to_ends * weight;
-            let g = to_ends.transpose() * sums.gradient * weight;
-            let mut block = hessian.fixed_view_mut::<12, 12>(0, 0);
-            block += h;
-            let mut rows = gradient.fixed_rows_mut::<12>(0);
-            rows += g;
+        let mut weight = 1.0 / self.settings.photometric_correlation;
+        if let Some((expected, _)) = expected_counts {
+            weight *= count_ratio(expected, pixels);
+        }
+        let mut sums = Linearised {
+            cost: weight * photometric.cost,
+            hessian: photometric.hessian * weight,
+            gradient: photometric.gradient * weight,
+            pixels,
+            depth_points: 0.0,
+        };
+        if let Some(depth) = &self.depth {
+            self.add_depth(depth, trajectory, expected_counts.map(|counts| counts.1), &mut sums);
         }
         let change = centre_motion_from_left(trajectory);
-        let mut result = Linearised {
-            cost,
-            hessian: change.transpose() * hessian * change,
-            gradient: change.transpose() * gradient,
-            photometric_cost: photometric.cost / pixels.max(1.0),
-            pixels,
-            depth_points,
-        };
-        self.add_priors(estimate, &mut result);
-        result
+        sums.hessian = change.transpose() * sums.hessian * change;
+        sums.gradient = change.transpose() * sums.gradient;
+        self.add_priors(estimate, &mut sums);
+        sums
+    }
+
+    /// Adds the depth term, distributed from the mid pose to both ends, in left rotations.
+    fn add_depth(
+        &self,
+        depth: &DepthPart,
+        trajectory: &ExposureTrajectory,
+        expected_points: Option<f64>,
+        sums: &mut Linearised,
+    ) {
+        let depth_sums =
+            depth.problem.linearise(self.simd, &trajectory.mid(), depth.sigma, self.settings.huber);
+        let weight =
+            depth.weight * expected_points.map_or(1.0, |expected| count_ratio(expected, depth_sums.points));
+        let to_ends = mid_from_ends(trajectory);
+        sums.cost += weight * depth_sums.cost;
+        sums.depth_points = depth_sums.points;
+        let mut block = sums.hessian.fixed_view_mut::<12, 12>(0, 0);
+        block += to_ends.transpose() * depth_sums.hessian * to_ends * weight;
+        let mut rows = sums.gradient.fixed_rows_mut::<12>(0);
+        rows += to_ends.transpose() * depth_sums.gradient * weight;
     }
 
     fn photometric(&self, estimate: &Estimate, costs: &mut [PatchCost]) -> PhotometricSums {
@@ -142,8 +165,8 @@ impl Objective<'_> {
         views: &'b [transfer::VirtualView],
     ) -> TransferProblem<'b> {
         TransferProblem {
-            reference: self.reference.pyramid.levels[self.level].image(),
-            current: self.frame.pyramid.levels[self.level].image(),
+            reference: self.reference.levels[self.level].image(),
+            current: self.frame.levels[self.level].image(),
             focal: [self.camera.fx as f32, self.camera.fy as f32],
             centre: [self.camera.cx as f32, self.camera.cy as f32],
             views,
@@ -172,6 +195,10 @@ impl Objective<'_> {
             result.gradient[12 + i] += information * residual;
         }
     }
+}
+
+fn count_ratio(expected: f64, count: f64) -> f64 {
+    if count > 0.0 { expected / count } else { 1.0 }
 }
 
 /// Derivative of the mid pose's left tangent by the left tangents of both ends.

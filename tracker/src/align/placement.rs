@@ -2,10 +2,11 @@
 
 use nalgebra::Vector3;
 
+use super::objective::FrameData;
 use crate::geometry::PinholeCamera;
 use crate::keyframe::Keypoint;
 use crate::math::{round_half_up_to_i32, sqrt_f32};
-use crate::surface::{InverseDepthMap, spread_limit};
+use crate::surface::spread_limit;
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::{PATTERN_RADIUS, PatchSite};
 
@@ -16,14 +17,14 @@ pub fn place_sites(
     keypoints: &[Keypoint],
     camera: &PinholeCamera,
     level: usize,
-    current_depth: &InverseDepthMap,
+    frame: &FrameData,
     sites: &mut [PatchSite],
 ) -> usize {
     let camera_from_keyframe = keyframe_from_camera.mid().inverse();
     let rotation = camera_from_keyframe.rotation_matrix().map(|x| x as f32);
     let translation = camera_from_keyframe.translation.map(|x| x as f32);
     let (fx, fy, cx, cy) = (camera.fx as f32, camera.fy as f32, camera.cx as f32, camera.cy as f32);
-    let margin = PATTERN_RADIUS as i32;
+    let region = frame.region.at_level(level).shrunk(PATTERN_RADIUS);
     let mut count = 0;
     for keypoint in keypoints {
         let ray = Vector3::new((keypoint.u - cx) / fx, (keypoint.v - cy) / fy, 1.0);
@@ -34,16 +35,13 @@ pub fn place_sites(
         }
         let (u, v) = (fx * x.x / x.z + cx, fy * x.y / x.z + cy);
         let (column, row) = (round_half_up_to_i32(u), round_half_up_to_i32(v));
-        let inside = column >= margin
-            && row >= margin
-            && column < camera.width as i32 - margin
-            && row < camera.height as i32 - margin;
-        if !inside {
+        if !region.contains(column, row) {
             continue;
         }
-        let at = |pixel: f32| PinholeCamera::pixel_at_level(pixel, level, current_depth.level);
+        let at = |pixel: f32| PinholeCamera::pixel_at_level(pixel, level, frame.depth_level);
         let expected = keypoint.inverse_depth / x.z;
-        let hidden = current_depth
+        let hidden = frame
+            .depth
             .sample(at(u), at(v))
             .is_some_and(|observed| (observed - expected).abs() > 2.0 * spread_limit(expected));
         if !hidden {

@@ -12,7 +12,7 @@ pub struct AlignSettings {
     pub view_spacing: f32,
     /// Upper bound of virtual views per exposure.
     pub max_views: usize,
-    /// Levenberg-Marquardt iterations per pyramid level, at the most.
+    /// Linearisations per pyramid level, at the most.
     pub max_iterations: usize,
     /// Huber threshold in robust standard deviations.
     pub huber: f32,
@@ -30,7 +30,8 @@ pub struct AlignSettings {
     pub offset_sigma: f64,
     /// A patch is dropped when its mean cost exceeds this multiple of the median over patches.
     pub outlier_factor: f32,
-    /// Iterations stop when a step moves the image by less than this many pixels of the level.
+    /// Iterations stop when a step moves the image by less than this many pixels of the level; coarse levels may
+    /// stop earlier.
     pub min_step: f64,
 }
 
@@ -50,7 +51,7 @@ impl Default for AlignSettings {
             gain_sigma: 0.05,
             offset_sigma: 0.005,
             outlier_factor: 6.0,
-            min_step: 0.02,
+            min_step: 0.03,
         }
     }
 }

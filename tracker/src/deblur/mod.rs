@@ -30,6 +30,7 @@ const SATURATION: f32 = 0.98;
 pub struct DeblurScratch<'m> {
     /// Blur path of every block.
     pub flow: BlurFlow<'m>,
+    captured: &'m mut [f32],
     reblurred: &'m mut [f32],
     correction: &'m mut [f32],
 }
@@ -49,7 +50,7 @@ impl<'m> DeblurScratch<'m> {
     /// Bytes of workspace for images of this size.
     #[must_use]
     pub const fn bytes(width: usize, height: usize) -> usize {
-        BlurFlow::bytes(width, height) + 2 * slice_bytes::<f32>(width * height)
+        BlurFlow::bytes(width, height) + 3 * slice_bytes::<f32>(width * height)
     }
 
     /// Takes the memory from `arena`.
@@ -59,61 +60,57 @@ impl<'m> DeblurScratch<'m> {
     pub fn carve(arena: &mut Arena<'m>, width: usize, height: usize) -> Result<Self, WorkspaceError> {
         Ok(Self {
             flow: BlurFlow::carve(arena, width, height)?,
+            captured: arena.take(width * height)?,
             reblurred: arena.take(width * height)?,
             correction: arena.take(width * height)?,
         })
     }
 
-    /// Deblurs `captured` into `sharp` along the flow, whose longest displacement is `longest` pixels.
+    /// Remembers the image as captured, for [`Self::deblur`].
+    pub fn capture(&mut self, image: &[f32]) {
+        self.captured.copy_from_slice(image);
+    }
+
+    /// Writes to `sharp` the remembered image deblurred along the flow, whose longest displacement is `longest`
+    /// pixels.
     ///
     /// The result never explains the captured image worse than the captured image itself does: if it did, the
-    /// motion was wrong and `sharp` is a copy of `captured`.
+    /// motion was wrong and `sharp` is a copy of the captured image.
     pub fn deblur(
         &mut self,
         level: Level,
         longest: f32,
         iterations: usize,
-        captured: &[f32],
         sharp: &mut [f32],
     ) -> DeblurReport {
-        let views = (longest / TAP_SPACING) as usize + 2;
-        let views = views.clamp(3, MAX_VIRTUAL_VIEWS);
-        sharp.copy_from_slice(captured);
-        let mut residual_before = 0.0;
-        for iteration in 0..iterations {
-            let residual = self.iterate(level, views, captured, sharp);
-            if iteration == 0 {
-                residual_before = residual;
+        let views = ((longest / TAP_SPACING) as usize + 2).clamp(3, MAX_VIRTUAL_VIEWS);
+        sharp.copy_from_slice(self.captured);
+        let residual_before = self.compare(level, views, sharp);
+        let mut residual_after = residual_before;
+        for _ in 0..iterations {
+            blur_along(level, self.reblurred, &self.flow, views, self.correction);
+            for (light, factor) in sharp.iter_mut().zip(&*self.correction) {
+                *light *= factor;
             }
+            residual_after = self.compare(level, views, sharp);
         }
-        blur_along(level, sharp, &self.flow, views, self.reblurred);
-        let squares = dispatch!(level, simd => ratios(simd, captured, self.reblurred));
-        let residual_after = root_mean(squares, captured.len());
         let kept = residual_after < residual_before;
         if !kept {
-            sharp.copy_from_slice(captured);
+            sharp.copy_from_slice(self.captured);
         }
         DeblurReport { residual_before, residual_after, kept }
     }
 
-    /// One Richardson-Lucy iteration; returns the root mean square residual before it.
-    fn iterate(&mut self, level: Level, views: usize, captured: &[f32], sharp: &mut [f32]) -> f32 {
+    /// Blurs `sharp` and leaves the ratio of captured to blurred light; returns the root mean square difference.
+    fn compare(&mut self, level: Level, views: usize, sharp: &[f32]) -> f32 {
         blur_along(level, sharp, &self.flow, views, self.reblurred);
-        let squares = dispatch!(level, simd => ratios(simd, captured, self.reblurred));
-        blur_along(level, self.reblurred, &self.flow, views, self.correction);
-        for (light, factor) in sharp.iter_mut().zip(&*self.correction) {
-            *light *= factor;
-        }
-        root_mean(squares, captured.len())
+        let squares = dispatch!(level, simd => ratios(simd, self.captured, self.reblurred));
+        sqrt_f32((squares / self.captured.len().max(1) as f64) as f32)
     }
 }
 
 /// Distance between neighbouring taps along the longest path, pixels.
 const TAP_SPACING: f32 = 1.5;
-
-fn root_mean(squares: f64, count: usize) -> f32 {
-    sqrt_f32((squares / count.max(1) as f64) as f32)
-}
 
 /// Replaces reblurred light by the ratio captured/reblurred; returns the sum of squared differences.
 #[inline(always)]

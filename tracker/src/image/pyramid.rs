@@ -6,7 +6,7 @@ use super::view::{ColourView, PixelFormat};
 use crate::geometry::PinholeCamera;
 use crate::photometric::LuminanceTable;
 use crate::transfer::LevelImage;
-use crate::workspace::{Arena, WorkspaceError};
+use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Upper bound of pyramid levels.
 pub const MAX_LEVELS: usize = 6;
@@ -38,13 +38,13 @@ pub struct GreyPyramid<'m> {
 }
 
 impl<'m> GreyPyramid<'m> {
-    /// Number of intensities in a pyramid of `levels` levels whose finest is `finest`.
+    /// Bytes of workspace of a pyramid.
     #[must_use]
-    pub const fn len(width: usize, height: usize, finest: usize, levels: usize) -> usize {
+    pub const fn bytes(width: usize, height: usize, levels: usize) -> usize {
         let mut sum = 0;
-        let mut level = finest;
+        let mut level = 0;
         while level < levels {
-            sum += (width >> level) * (height >> level);
+            sum += slice_bytes::<f32>((width >> level) * (height >> level));
             level += 1;
         }
         sum
@@ -86,13 +86,6 @@ impl<'m> GreyPyramid<'m> {
                 let bottom = &fine.pixels[(2 * v + 1) * fine.width..][..fine.width];
                 halve_row(top, bottom, row);
             }
-        }
-    }
-
-    /// Copies another pyramid of the same shape.
-    pub fn copy_from(&mut self, other: &GreyPyramid) {
-        for (to, from) in self.levels.iter_mut().zip(&other.levels) {
-            to.pixels.copy_from_slice(from.pixels);
         }
     }
 }

@@ -133,6 +133,38 @@ pub struct PixelRectangle {
     pub bottom: usize,
 }
 
+impl PixelRectangle {
+    /// The pixels of pyramid level `level` that lie wholly in the rectangle.
+    #[must_use]
+    pub fn at_level(&self, level: usize) -> Self {
+        let block = 1usize << level;
+        Self {
+            left: self.left.div_ceil(block),
+            top: self.top.div_ceil(block),
+            right: self.right / block,
+            bottom: self.bottom / block,
+        }
+    }
+
+    /// The rectangle without a border of `margin` pixels; empty if nothing is left.
+    #[must_use]
+    pub fn shrunk(&self, margin: usize) -> Self {
+        let (left, top) = (self.left + margin, self.top + margin);
+        Self {
+            left,
+            top,
+            right: self.right.saturating_sub(margin).max(left),
+            bottom: self.bottom.saturating_sub(margin).max(top),
+        }
+    }
+
+    /// Whether pixel `(u, v)` lies in the rectangle.
+    #[must_use]
+    pub fn contains(&self, u: i32, v: i32) -> bool {
+        u >= self.left as i32 && v >= self.top as i32 && u < self.right as i32 && v < self.bottom as i32
+    }
+}
+
 /// A large rectangle of `map` (row-major, `width` columns) in which every pixel has a source: outside it black
 /// corners of the undistorted image would be taken for edges.
 ///

@@ -4,8 +4,8 @@ use arrayvec::ArrayVec;
 
 use super::select::{Keypoint, SelectionSettings, select_keypoints};
 use crate::geometry::{PinholeCamera, RigidTransform};
-use crate::image::{GreyPyramid, MAX_LEVELS};
-use crate::surface::{InverseDepthMap, SurfacePlanes};
+use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
+use crate::surface::{InverseDepthMap, SurfacePlanes, fuse_depth};
 use crate::trajectory::ExposureTrajectory;
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
@@ -21,37 +21,32 @@ const CELL: [usize; MAX_LEVELS] = [24, 14, 9, 6, 4, 4];
 pub struct Keyframe<'m> {
     /// Reference image; sharp, or as sharp as could be had.
     pub pyramid: GreyPyramid<'m>,
-    /// Full-resolution image as captured.
-    pub captured: &'m mut [f32],
     /// Inverse depth.
     pub depth: InverseDepthMap<'m>,
     /// Surface planes of `depth`.
     pub planes: SurfacePlanes<'m>,
+    /// Measurements behind every value of `depth`.
+    weights: &'m mut [f32],
+    fusions: usize,
     keypoints: ArrayVec<&'m mut [Keypoint], MAX_LEVELS>,
     counts: [usize; MAX_LEVELS],
-    /// Pose at mid exposure.
+    /// `world_from_keyframe` at mid exposure.
     pub world_from_keyframe: RigidTransform,
-    /// Exposure of the keyframe seen from its own mid pose, once known.
+    /// Exposure of the keyframe seen from its own mid pose; `None` while it is unknown.
     pub keyframe_from_camera: Option<ExposureTrajectory>,
-    /// Blur of the reference image in pixels.
+    /// Blur of the image as captured, pixels of its finest level; `f32::MAX` while it is unknown.
     pub blur: f32,
     /// Running number of the frame it was made from.
     pub frame_index: usize,
 }
 
 impl<'m> Keyframe<'m> {
-    /// Bytes of workspace that a keyframe takes.
+    /// Bytes of workspace that a keyframe of `levels` levels takes whose depth map is on `surface_level`.
     #[must_use]
     pub const fn bytes(width: usize, height: usize, levels: usize, surface_level: usize) -> usize {
-        let mut sum = 0;
-        let mut level = 0;
-        while level < levels {
-            sum += slice_bytes::<f32>((width >> level) * (height >> level));
-            level += 1;
-        }
         let surface = (width >> surface_level) * (height >> surface_level);
-        sum + slice_bytes::<f32>(width * height)
-            + 4 * slice_bytes::<f32>(surface)
+        GreyPyramid::bytes(width, height, levels)
+            + 5 * slice_bytes::<f32>(surface)
             + levels * slice_bytes::<Keypoint>(MAX_KEYPOINTS)
     }
 
@@ -69,14 +64,16 @@ impl<'m> Keyframe<'m> {
         let pyramid = GreyPyramid::carve(arena, camera, levels)?;
         let depth = InverseDepthMap::carve(arena, camera, surface_level)?;
         let planes = SurfacePlanes::carve(arena, camera, surface_level)?;
+        let weights = arena.take(depth.values.len())?;
         for _ in 0..levels.min(MAX_LEVELS) {
             keypoints.push(arena.take(MAX_KEYPOINTS)?);
         }
         Ok(Self {
             pyramid,
-            captured: arena.take(camera.width * camera.height)?,
             depth,
             planes,
+            weights,
+            fusions: 0,
             keypoints,
             counts: [0; MAX_LEVELS],
             world_from_keyframe: RigidTransform::identity(),
@@ -86,16 +83,15 @@ impl<'m> Keyframe<'m> {
         })
     }
 
-    /// Fits the planes and selects the keypoints for the current image and depth.
-    pub fn prepare(&mut self, min_strength: f32, dark_intensity: f32) {
-        self.planes.fit(&self.depth);
-        self.select(min_strength, dark_intensity);
-    }
-
-    /// Selects the keypoints for the current image and planes.
-    pub fn select(&mut self, min_strength: f32, dark_intensity: f32) {
+    /// Selects the keypoints of every level within `region` of the finest, for the current image and planes.
+    pub fn select(&mut self, min_strength: f32, dark_intensity: f32, region: PixelRectangle) {
         for (level, keypoints) in self.keypoints.iter_mut().enumerate() {
-            let settings = SelectionSettings { cell: CELL[level], min_strength, dark_intensity };
+            let settings = SelectionSettings {
+                cell: CELL[level],
+                min_strength,
+                dark_intensity,
+                region: region.at_level(level),
+            };
             self.counts[level] = select_keypoints(
                 &self.pyramid.levels[level].image(),
                 level,
@@ -107,9 +103,64 @@ impl<'m> Keyframe<'m> {
         }
     }
 
+    /// Starts anew with the depth map as it is: one measurement per pixel, planes fitted to it.
+    pub fn restart_surface(&mut self) {
+        self.weights.fill(1.0);
+        self.fusions = 0;
+        self.planes.fit(&self.depth);
+    }
+
+    /// Averages in the depth map of a frame at `keyframe_from_camera`; `camera` is that of the depth maps. Planes
+    /// and keypoint depths follow whenever the number of frames has doubled.
+    pub fn fuse_depth(
+        &mut self,
+        current: &InverseDepthMap,
+        keyframe_from_camera: &RigidTransform,
+        camera: &PinholeCamera,
+    ) {
+        fuse_depth(&mut self.depth, self.weights, current, keyframe_from_camera, camera);
+        self.fusions += 1;
+        if self.fusions.is_power_of_two() {
+            self.planes.fit(&self.depth);
+            for (level, keypoints) in self.keypoints.iter_mut().enumerate() {
+                let at = |x: f32| PinholeCamera::pixel_at_level(x, level, self.depth.level);
+                for keypoint in &mut keypoints[..self.counts[level]] {
+                    if let Some(rho) = self.planes.inverse_depth(at(keypoint.u), at(keypoint.v)) {
+                        keypoint.inverse_depth = rho;
+                    }
+                }
+            }
+        }
+    }
+
     /// Keypoints of every level.
     #[must_use]
     pub fn keypoints(&self) -> ArrayVec<&[Keypoint], MAX_LEVELS> {
         self.keypoints.iter().zip(self.counts).map(|(keypoints, count)| &keypoints[..count]).collect()
+    }
+
+    /// Keypoints of the finest level.
+    #[must_use]
+    pub fn finest_keypoints(&self) -> &[Keypoint] {
+        self.keypoints.first().map_or(&[], |keypoints| &keypoints[..self.counts[0]])
+    }
+
+    /// Copies the coarse part of `other`, whose level `skip` has the size of this keyframe's finest level and
+    /// carries its depth map.
+    pub fn copy_coarse(&mut self, other: &Keyframe, skip: usize) {
+        for (to, from) in self.pyramid.levels.iter_mut().zip(other.pyramid.levels.iter().skip(skip)) {
+            to.pixels.copy_from_slice(from.pixels);
+        }
+        self.depth.values.copy_from_slice(other.depth.values);
+        self.planes.copy_from(&other.planes);
+        for (level, to) in self.keypoints.iter_mut().enumerate() {
+            let count = other.counts[level + skip];
+            to[..count].copy_from_slice(&other.keypoints[level + skip][..count]);
+            self.counts[level] = count;
+        }
+        self.world_from_keyframe = other.world_from_keyframe;
+        self.keyframe_from_camera = other.keyframe_from_camera;
+        self.blur = other.blur / (1u32 << skip) as f32;
+        self.frame_index = other.frame_index;
     }
 }

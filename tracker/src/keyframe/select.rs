@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::geometry::PinholeCamera;
+use crate::image::PixelRectangle;
 use crate::math::sqrt_f32;
 use crate::surface::SurfacePlanes;
 use crate::transfer::{LevelImage, PATTERN_RADIUS};
@@ -30,6 +31,8 @@ pub struct SelectionSettings {
     pub min_strength: f32,
     /// Intensity at which constant noise equals photon noise, linear light.
     pub dark_intensity: f32,
+    /// Part of the image that holds data.
+    pub region: PixelRectangle,
 }
 
 /// Selects keypoints of one pyramid level, at most one per cell, in row-major cell order; returns how many.
@@ -44,16 +47,16 @@ pub fn select_keypoints(
     settings: &SelectionSettings,
     keypoints: &mut [Keypoint],
 ) -> usize {
-    let margin = PATTERN_RADIUS + 1;
+    let region = settings.region.shrunk(PATTERN_RADIUS + 1);
     let cell = settings.cell.max(1);
     let mut count = 0;
-    for cell_v in (margin..image.height.saturating_sub(margin)).step_by(cell) {
-        for cell_u in (margin..image.width.saturating_sub(margin)).step_by(cell) {
+    for cell_v in (region.top..region.bottom.min(image.height)).step_by(cell) {
+        for cell_u in (region.left..region.right.min(image.width)).step_by(cell) {
             if count == keypoints.len() {
                 return count;
             }
-            let last_v = (cell_v + cell).min(image.height - margin);
-            let last_u = (cell_u + cell).min(image.width - margin);
+            let last_v = (cell_v + cell).min(region.bottom);
+            let last_u = (cell_u + cell).min(region.right);
             let Some((u, v, strength)) = strongest(image, cell_u..last_u, cell_v..last_v, settings) else {
                 continue;
             };

@@ -5,7 +5,9 @@
 //! plane's inverse depth is linear in the image.
 
 mod block_mean;
+mod fusion;
 mod planes;
 
 pub use block_mean::{InverseDepthMap, spread_limit};
+pub use fusion::fuse_depth;
 pub use planes::SurfacePlanes;

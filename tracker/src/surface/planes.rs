@@ -58,6 +58,13 @@ impl<'m> SurfacePlanes<'m> {
         }
     }
 
+    /// Copies planes of the same size.
+    pub fn copy_from(&mut self, other: &SurfacePlanes) {
+        self.value.copy_from_slice(other.value);
+        self.slope_u.copy_from_slice(other.slope_u);
+        self.slope_v.copy_from_slice(other.slope_v);
+    }
+
     /// Inverse depth of the plane nearest to `(u, v)`, continued to that point; `None` where there is none.
     #[must_use]
     pub fn inverse_depth(&self, u: f32, v: f32) -> Option<f32> {

@@ -4,7 +4,7 @@ use crate::align::AlignSettings;
 use crate::deblur::DeblurScratch;
 use crate::error::ConfigError;
 use crate::geometry::PinholeCamera;
-use crate::image::{GreyPyramid, MAX_LEVELS};
+use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
 use crate::keyframe::{Keyframe, MAX_KEYPOINTS};
 use crate::photometric::InverseResponse;
 use crate::transfer::{PatchCost, PatchSite};
@@ -30,18 +30,16 @@ pub struct TrackerConfig {
     pub response: InverseResponse,
     /// Pyramid levels, 2 to 6.
     pub levels: usize,
-    /// Pyramid level of the depth term's maps.
+    /// Pyramid level of the depth maps.
     pub surface_level: usize,
+    /// Part of the images that holds data; undistortion leaves a border without.
+    pub region: PixelRectangle,
     /// Where the sharp reference comes from.
     pub reference: ReferenceMode,
-    /// Settings of the alignment.
-    pub align: AlignSettings,
     /// Richardson-Lucy iterations on a keyframe.
     pub deblur_iterations: usize,
-    /// debug
-    pub debug: Option<fn(usize, &[f32], &[f32])>,
-    /// Whether the first guess may be changed by trying several motions on the coarse levels.
-    pub hypotheses: bool,
+    /// Settings of the alignment.
+    pub align: AlignSettings,
 }
 
 impl TrackerConfig {
@@ -62,11 +60,10 @@ impl TrackerConfig {
             response,
             levels,
             surface_level,
+            region: PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height },
             reference: ReferenceMode::Deblurred,
+            deblur_iterations: 4,
             align: AlignSettings::default(),
-            deblur_iterations: 5,
-            debug: None,
-            hypotheses: true,
         }
     }
 
@@ -76,20 +73,20 @@ impl TrackerConfig {
     /// [`ConfigError::Setting`] naming the first setting outside its range.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let c = &self.camera;
+        let size = 32..=8192usize;
+        let coarsest = self.levels.saturating_sub(1).min(16);
+        let smallest = (c.width >> coarsest).min(c.height >> coarsest);
+        let scale = f64::from(self.metres_per_unit);
         let checks = [
-            ("width", c.width as f64, (32.0..=8192.0).contains(&(c.width as f64)), "32 to 8192 pixels"),
-            ("height", c.height as f64, (32.0..=8192.0).contains(&(c.height as f64)), "32 to 8192 pixels"),
+            ("width", c.width as f64, size.contains(&c.width), "32 to 8192 pixels"),
+            ("height", c.height as f64, size.contains(&c.height), "32 to 8192 pixels"),
             ("fx", c.fx, c.fx > 1.0 && c.fx < 1e5, "1 to 100000 pixels"),
             ("fy", c.fy, c.fy > 1.0 && c.fy < 1e5, "1 to 100000 pixels"),
             ("cx", c.cx, c.cx.abs() < 1e5, "a pixel column"),
             ("cy", c.cy, c.cy.abs() < 1e5, "a pixel row"),
-            (
-                "metres_per_unit",
-                f64::from(self.metres_per_unit),
-                self.metres_per_unit > 0.0 && self.metres_per_unit < 1.0,
-                "above 0 and below 1 metre",
-            ),
+            ("metres_per_unit", scale, scale > 0.0 && scale < 1.0, "above 0 and below 1 metre"),
             ("levels", self.levels as f64, (2..=MAX_LEVELS).contains(&self.levels), "2 to 6"),
+            ("levels", self.levels as f64, smallest >= 16, "at least 16 pixels on the coarsest level"),
             (
                 "surface_level",
                 self.surface_level as f64,
@@ -97,42 +94,40 @@ impl TrackerConfig {
                 "less than the number of levels",
             ),
         ];
-        for (name, value, good, expected) in checks {
-            if !good {
-                return Err(ConfigError::Setting { name, value, expected });
-            }
+        match checks.into_iter().find(|check| !check.2) {
+            Some((name, value, _, expected)) => Err(ConfigError::Setting { name, value, expected }),
+            None => Ok(()),
         }
-        if c.width >> (self.levels - 1) < 16 || c.height >> (self.levels - 1) < 16 {
-            return Err(ConfigError::Setting {
-                name: "levels",
-                value: self.levels as f64,
-                expected: "at least 16 pixels on the coarsest level",
-            });
-        }
-        Ok(())
+    }
+
+    /// Bytes of memory that a tracker with this configuration needs, see [`workspace_len`].
+    #[must_use]
+    pub const fn workspace_len(&self) -> usize {
+        workspace_len(self.camera.width, self.camera.height, self.levels, self.surface_level)
     }
 }
 
-/// Bytes of memory that a tracker for images of this size needs.
+/// Keyframes before the current one that a lost tracker looks for.
+pub(super) const RECENT_KEYFRAMES: usize = 4;
+
+/// Upper bound of the residuals that a robust scale is computed from.
+pub(super) const SCALE_SAMPLES: usize = 4096;
+
+/// Bytes of memory that a tracker needs for images of `width` by `height` pixels, `levels` pyramid levels and
+/// depth maps on level `surface_level`. Known at compile time, so that the memory can be a static array.
 #[must_use]
 pub const fn workspace_len(width: usize, height: usize, levels: usize, surface_level: usize) -> usize {
-    let mut pyramid = 0;
-    let mut level = 0;
-    while level < levels {
-        pyramid += slice_bytes::<f32>(GreyPyramid::len(width, height, level, level + 1));
-        level += 1;
-    }
-    let surface = (width >> surface_level) * (height >> surface_level);
-    let frame = pyramid + slice_bytes::<f32>(surface);
+    let (surface_width, surface_height) = (width >> surface_level, height >> surface_level);
+    let current =
+        GreyPyramid::bytes(width, height, levels) + slice_bytes::<f32>(surface_width * surface_height);
+    let recent = Keyframe::bytes(surface_width, surface_height, levels - surface_level, 0);
     let scratch = slice_bytes::<PatchSite>(MAX_KEYPOINTS)
         + slice_bytes::<PatchCost>(MAX_KEYPOINTS)
         + slice_bytes::<f32>(SCALE_SAMPLES);
     ARENA_ALIGNMENT
-        + frame
+        + current
         + Keyframe::bytes(width, height, levels, surface_level)
+        + RECENT_KEYFRAMES * recent
         + scratch
         + DeblurScratch::bytes(width, height)
 }
-
-/// Upper bound of the residuals that a robust scale is computed from.
-pub(super) const SCALE_SAMPLES: usize = 4096;

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 
+use crate::geometry::RigidTransform;
 use crate::image::{ColourView, DepthView};
 
 /// One RGB-D frame.
@@ -17,4 +18,15 @@ pub struct Frame<'a> {
     pub depth: DepthView<'a>,
     /// Mean angular velocity between the frame before and this one, camera frame, rad/s, if a gyroscope is at hand.
     pub angular_velocity: Option<Vector3<f64>>,
+}
+
+/// A sharp view from outside, for example rendered from a map.
+#[derive(Clone, Copy, Debug)]
+pub struct ReferenceView<'a> {
+    /// Sharp colour or grey image, encoded like the camera's.
+    pub colour: ColourView<'a>,
+    /// Depth image in the camera's raw units.
+    pub depth: DepthView<'a>,
+    /// Pose of the view in the tracker's world.
+    pub world_from_camera: RigidTransform,
 }

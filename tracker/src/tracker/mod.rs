@@ -1,12 +1,15 @@
 //! The tracker: frames in, poses at shutter opening and closing out.
 
+mod coarse_to_fine;
 mod config;
 mod frame;
 mod history;
+mod policy;
+mod recovery;
 mod result;
 mod track;
 
 pub use config::{ReferenceMode, TrackerConfig, workspace_len};
-pub use frame::Frame;
-pub use result::{FrameResult, FrameStatus};
+pub use frame::{Frame, ReferenceView};
+pub use result::{FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

@@ -1,9 +1,10 @@
 //! Output of the tracker.
 
-use crate::align::{StopReason, UNKNOWNS};
+use nalgebra::SMatrix;
+
+use crate::align::{LevelOutcome, StopReason, UNKNOWNS};
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
-use nalgebra::SMatrix;
 
 /// How far a result can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +15,29 @@ pub enum FrameStatus {
     Weak,
     /// Not aligned: the pose is the last good one.
     Lost,
+}
+
+impl FrameStatus {
+    /// `ok`, `weak` or `lost`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Weak => "weak",
+            Self::Lost => "lost",
+        }
+    }
+}
+
+/// A better estimate of an earlier frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Revision {
+    /// Running number of the frame.
+    pub index: usize,
+    /// `world_from_camera` at its shutter opening and closing.
+    pub world_from_camera: ExposureTrajectory,
+    /// Its blur in pixels.
+    pub blur: f32,
 }
 
 /// Everything known about a frame after tracking.
@@ -27,7 +51,8 @@ pub struct FrameResult {
     pub status: FrameStatus,
     /// `world_from_camera` at shutter opening and closing; the world is the first frame's camera at mid exposure.
     pub world_from_camera: ExposureTrajectory,
-    /// Inverse covariance of (centre motion, exposure motion, gain, offset) as the objective sees it.
+    /// Inverse covariance of (centre motion, exposure motion, gain, offset) as the objective sees it: translation
+    /// in keyframe axes in metres, rotation in the camera in radians.
     pub information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     /// Brightness relative to the reference.
     pub brightness: BrightnessModel,
@@ -41,7 +66,7 @@ pub struct FrameResult {
     pub residual: f32,
     /// Share of the keyframe's patches that are in view and agree.
     pub inliers: f32,
-    /// Robust depth residual, 1/m.
+    /// Robust depth residual, 1/m; 0 when the depth term did not take part.
     pub depth_residual: f32,
     /// Why the last level ended.
     pub stop: StopReason,
@@ -49,4 +74,37 @@ pub struct FrameResult {
     pub is_keyframe: bool,
     /// Running number of the frame that it was aligned with.
     pub reference_index: usize,
+    /// What this frame taught about an earlier one: the motion of the very first frame is known only after the
+    /// second.
+    pub revision: Option<Revision>,
+}
+
+impl FrameResult {
+    /// A result with the figures of an alignment; the rest is that of a lost frame.
+    pub(super) fn of(
+        index: usize,
+        timestamp: f64,
+        world_from_camera: ExposureTrajectory,
+        outcome: &LevelOutcome,
+        iterations: usize,
+    ) -> Self {
+        Self {
+            index,
+            timestamp,
+            status: FrameStatus::Lost,
+            world_from_camera,
+            information: outcome.information,
+            brightness: outcome.estimate.brightness,
+            blur: 0.0,
+            virtual_views: outcome.views,
+            iterations,
+            residual: outcome.photometric_scale,
+            inliers: 0.0,
+            depth_residual: outcome.depth_scale,
+            stop: outcome.stop,
+            is_keyframe: false,
+            reference_index: index,
+            revision: None,
+        }
+    }
 }

@@ -2,28 +2,36 @@
 
 use core::mem;
 
-use arrayvec::ArrayVec;
 use fearless_simd::Level;
-use nalgebra::Vector6;
 
-use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
-use super::frame::Frame;
+use super::coarse_to_fine::{Aligned, FrameTask};
+use super::config::{RECENT_KEYFRAMES, ReferenceMode, SCALE_SAMPLES, TrackerConfig};
+use super::frame::{Frame, ReferenceView};
 use super::history::Motion;
-use super::result::{FrameResult, FrameStatus};
-use crate::align::{
-    AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, MotionPrior, ReferenceData, StopReason,
-    align_level, blur_length,
-};
+use super::policy::{Evidence, Typical, judge, wants_keyframe};
+use super::recovery::RecentKeyframes;
+use super::result::{FrameResult, FrameStatus, Revision};
+use crate::align::{AlignScratch, Alignment, FrameData, LevelOutcome, ReferenceData, blur_length};
 use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
 use crate::geometry::RigidTransform;
 use crate::image::GreyPyramid;
-use crate::keyframe::{Keyframe, MAX_KEYPOINTS};
+use crate::keyframe::{Keyframe, Keypoint, MAX_KEYPOINTS};
 use crate::photometric::LuminanceTable;
 use crate::surface::InverseDepthMap;
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
 use crate::workspace::Arena;
+
+/// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
+const MIN_STRENGTH: f32 = 0.02;
+
+/// Fewest keypoints on the finest level, and least share of measured depth, to start from.
+const MIN_START_KEYPOINTS: usize = 24;
+const MIN_START_DEPTH: f32 = 0.1;
+
+/// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
+const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
 
 /// Estimates camera poses at shutter opening and closing, frame by frame.
 #[derive(Debug)]
@@ -33,37 +41,50 @@ pub struct Tracker<'m> {
     luminance: LuminanceTable,
     pyramid: GreyPyramid<'m>,
     depth: InverseDepthMap<'m>,
+    depth_share: f32,
     keyframe: Keyframe<'m>,
+    recent: RecentKeyframes<'m>,
     scratch: AlignScratch<'m>,
     deblur: DeblurScratch<'m>,
+    /// Motion in the world; `None` before the first usable frame.
     motion: Option<Motion>,
     brightness: BrightnessModel,
+    typical: Typical,
+    last_timestamp: f64,
+    lost_frames: usize,
     frames: usize,
 }
 
 impl<'m> Tracker<'m> {
-    /// Builds a tracker that runs on instruction set `simd` in the caller's memory of at least [`super::workspace_len`] bytes.
+    /// Builds a tracker that runs on instruction set `simd` in the caller's memory of at least
+    /// [`TrackerConfig::workspace_len`] bytes. Nothing is allocated, now or later.
     ///
     /// # Errors
     /// [`ConfigError`] when a setting is outside its range or the memory is too short.
     pub fn new(config: &TrackerConfig, simd: Level, memory: &'m mut [u8]) -> Result<Self, ConfigError> {
         config.validate()?;
         let mut arena = Arena::new(memory);
+        let (camera, levels, surface_level) = (&config.camera, config.levels, config.surface_level);
         Ok(Self {
             simd,
             luminance: LuminanceTable::new(&config.response),
-            pyramid: GreyPyramid::carve(&mut arena, &config.camera, config.levels)?,
-            depth: InverseDepthMap::carve(&mut arena, &config.camera, config.surface_level)?,
-            keyframe: Keyframe::carve(&mut arena, &config.camera, config.levels, config.surface_level)?,
+            pyramid: GreyPyramid::carve(&mut arena, camera, levels)?,
+            depth: InverseDepthMap::carve(&mut arena, camera, surface_level)?,
+            depth_share: 0.0,
+            keyframe: Keyframe::carve(&mut arena, camera, levels, surface_level)?,
+            recent: RecentKeyframes::carve(&mut arena, camera, levels, surface_level, RECENT_KEYFRAMES)?,
             scratch: AlignScratch {
                 sites: arena.take(MAX_KEYPOINTS)?,
                 costs: arena.take(MAX_KEYPOINTS)?,
                 medians: arena.take(SCALE_SAMPLES)?,
             },
-            deblur: DeblurScratch::carve(&mut arena, config.camera.width, config.camera.height)?,
+            deblur: DeblurScratch::carve(&mut arena, camera.width, camera.height)?,
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),
+            typical: Typical::default(),
+            last_timestamp: f64::NEG_INFINITY,
+            lost_frames: 0,
             frames: 0,
         })
     }
@@ -75,190 +96,313 @@ impl<'m> Tracker<'m> {
     pub fn track(&mut self, frame: &Frame) -> Result<FrameResult, FrameError> {
         self.check(frame)?;
         self.pyramid.fill(&frame.colour, &self.luminance);
-        self.depth.fill(&frame.depth, self.config.metres_per_unit);
+        self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
         let result = match self.motion {
             None => self.start(frame),
             Some(motion) => self.follow(frame, &motion),
         };
+        self.last_timestamp = frame.timestamp;
         self.frames += 1;
         Ok(result)
     }
 
-    fn check(&self, frame: &Frame) -> Result<(), FrameError> {
-        let expected = (self.config.camera.width, self.config.camera.height);
-        for got in [frame.colour.size(), frame.depth.size()] {
-            if got != expected {
-                return Err(FrameError::Size { expected, got });
-            }
+    /// Replaces the keyframe by a sharp view from outside, for example rendered from a map.
+    ///
+    /// Its pose must be in the tracker's world. Tracking starts from it if no frame was tracked yet.
+    ///
+    /// # Errors
+    /// [`FrameError::Size`] when the images do not have the configured size, [`FrameError::Pose`] when the pose is
+    /// not finite or not a rotation.
+    pub fn set_reference(&mut self, view: &ReferenceView) -> Result<(), FrameError> {
+        self.check_size(&[view.colour.size(), view.depth.size()])?;
+        if !view.world_from_camera.is_valid() {
+            return Err(FrameError::Pose);
         }
-        if !(frame.exposure >= 0.0 && frame.exposure.is_finite()) {
-            return Err(FrameError::Exposure { got: frame.exposure });
-        }
-        let previous = self.motion.map_or(f64::NEG_INFINITY, |motion| motion.timestamp);
-        if !(frame.timestamp.is_finite() && frame.timestamp > previous) {
-            return Err(FrameError::Timestamp { previous, got: frame.timestamp });
+        self.keep_keyframe();
+        self.keyframe.pyramid.fill(&view.colour, &self.luminance);
+        self.keyframe.depth.fill(&view.depth, self.config.metres_per_unit);
+        self.keyframe.world_from_keyframe = view.world_from_camera;
+        self.keyframe.keyframe_from_camera = Some(ExposureTrajectory::still(RigidTransform::identity()));
+        self.keyframe.blur = 0.0;
+        self.keyframe.frame_index = self.frames.saturating_sub(1);
+        self.keyframe.restart_surface();
+        self.select_keypoints();
+        self.brightness = BrightnessModel::default();
+        if self.motion.is_none() && self.last_timestamp.is_finite() {
+            self.motion = Some(Motion::still(self.last_timestamp, 0.0, view.world_from_camera));
         }
         Ok(())
     }
 
-    fn start(&mut self, frame: &Frame) -> FrameResult {
-        let world_from_camera = ExposureTrajectory::still(RigidTransform::identity());
-        self.motion = Some(Motion {
-            timestamp: frame.timestamp,
-            exposure: frame.exposure,
-            world_from_camera,
-            world_from_mid: RigidTransform::identity(),
-            between_frames: Vector6::zeros(),
-            within_exposure: None,
-        });
-        self.promote(&RigidTransform::identity(), None, f32::MAX);
-        FrameResult {
-            index: self.frames,
-            timestamp: frame.timestamp,
-            status: FrameStatus::Ok,
-            world_from_camera,
-            information: nalgebra::SMatrix::zeros(),
-            brightness: self.brightness,
-            blur: 0.0,
-            virtual_views: 1,
-            iterations: 0,
-            residual: 0.0,
-            inliers: 1.0,
-            depth_residual: 0.0,
-            stop: StopReason::SmallStep,
-            is_keyframe: true,
-            reference_index: self.frames,
+    /// Forgets everything but the configuration.
+    pub fn reset(&mut self) {
+        self.motion = None;
+        self.recent.clear();
+        self.brightness = BrightnessModel::default();
+        self.typical = Typical::default();
+        self.last_timestamp = f64::NEG_INFINITY;
+        self.lost_frames = 0;
+        self.frames = 0;
+    }
+
+    fn check(&self, frame: &Frame) -> Result<(), FrameError> {
+        self.check_size(&[frame.colour.size(), frame.depth.size()])?;
+        if !(frame.exposure >= 0.0 && frame.exposure.is_finite()) {
+            return Err(FrameError::Exposure { got: frame.exposure });
+        }
+        if !(frame.timestamp.is_finite() && frame.timestamp > self.last_timestamp) {
+            return Err(FrameError::Timestamp { previous: self.last_timestamp, got: frame.timestamp });
+        }
+        Ok(())
+    }
+
+    fn check_size(&self, sizes: &[(usize, usize)]) -> Result<(), FrameError> {
+        let expected = (self.config.camera.width, self.config.camera.height);
+        match sizes.iter().find(|&&got| got != expected) {
+            Some(&got) => Err(FrameError::Size { expected, got }),
+            None => Ok(()),
         }
     }
 
-    fn follow(&mut self, frame: &Frame, motion: &Motion) -> FrameResult {
-        let dt = frame.timestamp - motion.timestamp;
-        let keyframe_from_world = self.keyframe.world_from_keyframe.inverse();
-        let local = Motion {
-            world_from_camera: motion.world_from_camera.seen_from(&keyframe_from_world),
-            world_from_mid: keyframe_from_world.compose(&motion.world_from_mid),
-            between_frames: rotate_translation(&keyframe_from_world, &motion.between_frames),
-            within_exposure: motion.within_exposure.map(|w| rotate_translation(&keyframe_from_world, &w)),
-            ..*motion
-        };
-        let (outcome, iterations) = self.align(frame, &local, dt);
-        self.conclude(frame, motion, &local, dt, outcome, iterations)
+    /// Makes the first usable frame the keyframe and the origin of the world.
+    fn start(&mut self, frame: &Frame) -> FrameResult {
+        let origin = RigidTransform::identity();
+        let still = ExposureTrajectory::still(origin);
+        let nothing = LevelOutcome::unchanged(crate::align::Estimate {
+            keyframe_from_camera: still,
+            brightness: BrightnessModel::default(),
+        });
+        let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing, 0);
+        self.promote(&origin, None, f32::MAX);
+        let enough = self.keyframe.finest_keypoints().len() >= MIN_START_KEYPOINTS;
+        if enough && self.depth_share >= MIN_START_DEPTH {
+            self.motion = Some(Motion::still(frame.timestamp, frame.exposure, origin));
+            result.status = FrameStatus::Ok;
+            result.inliers = 1.0;
+            result.is_keyframe = true;
+        }
+        result
     }
 
-    /// Aligns the current frame with the keyframe, coarse to fine.
-    fn align(&mut self, frame: &Frame, local: &Motion, dt: f64) -> (LevelOutcome, usize) {
-        let config = &self.config;
+    fn follow(&mut self, frame: &Frame, motion: &Motion) -> FrameResult {
+        let mut aligned;
+        let mut revision = None;
+        if self.config.align.blur && self.keyframe.keyframe_from_camera.is_none() && frame.exposure > 0.0 {
+            (aligned, revision) = self.bootstrap(frame, motion);
+        } else {
+            aligned = self.align(frame, motion, self.config.align.blur, None);
+        }
+        let mut status = self.judge(&aligned.outcome, motion, frame);
+        if status == FrameStatus::Lost && self.recover(frame, motion) {
+            let start = self.motion.unwrap_or(*motion);
+            aligned = self.align(frame, &start, self.config.align.blur, None);
+            status = match self.judge(&aligned.outcome, &start, frame) {
+                FrameStatus::Lost => FrameStatus::Lost,
+                _ => FrameStatus::Weak,
+            };
+        }
+        let mut result = match status {
+            FrameStatus::Lost => self.hold(frame, motion, &aligned),
+            _ => self.accept(frame, motion, &aligned, status),
+        };
+        result.revision = revision;
+        result
+    }
+
+    /// Aligns the first frame after the first keyframe, whose own motion is unknown.
+    ///
+    /// Both are blurred alike, so they are aligned as they are; the motion between them then deblurs the keyframe,
+    /// and the frame is aligned again.
+    fn bootstrap(&mut self, frame: &Frame, motion: &Motion) -> (Aligned, Option<Revision>) {
+        let first = self.align(frame, motion, false, None);
+        if self.judge(&first.outcome, motion, frame) == FrameStatus::Lost {
+            return (first, None);
+        }
+        let dt = frame.timestamp - motion.timestamp;
+        let mid = first.outcome.estimate.keyframe_from_camera.mid();
+        let rate = RigidTransform::identity().tangent_to(&mid) / dt;
+        self.set_keyframe_motion(&(rate * motion.exposure));
+        let second = self.align(frame, motion, true, Some(mid));
+        let within = second.outcome.estimate.keyframe_from_camera.motion() / frame.exposure;
+        let refined = (rate * 2.0 - within) * motion.exposure;
+        let keyframe_from_camera =
+            ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &refined);
+        self.keyframe.keyframe_from_camera = Some(keyframe_from_camera);
+        let revision = Revision {
+            index: self.keyframe.frame_index,
+            world_from_camera: keyframe_from_camera.seen_from(&self.keyframe.world_from_keyframe),
+            blur: self.blur_length(&keyframe_from_camera),
+        };
+        (second, Some(revision))
+    }
+
+    fn set_keyframe_motion(&mut self, motion: &nalgebra::Vector6<f64>) {
+        let exposure = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), motion);
+        self.keyframe.keyframe_from_camera = Some(exposure);
+        self.keyframe.blur = self.blur_length(&exposure);
+        self.sharpen_keyframe();
+    }
+
+    /// Aligns the current frame with the keyframe; from `start` alone if it is given.
+    fn align(
+        &mut self,
+        frame: &Frame,
+        world_motion: &Motion,
+        blur: bool,
+        start: Option<RigidTransform>,
+    ) -> Aligned {
         let keypoints = self.keyframe.keypoints();
         let reference = ReferenceData {
-            pyramid: &self.keyframe.pyramid,
+            levels: &self.keyframe.pyramid.levels,
             keypoints: &keypoints,
             depth: &self.keyframe.depth,
             planes: &self.keyframe.planes,
         };
-        let data = FrameData { pyramid: &self.pyramid, depth: &self.depth };
-        let inverse_depth = typical_inverse_depth(&self.keyframe);
-        let alignment = Alignment {
-            simd: self.simd,
-            camera: config.camera,
-            reference,
-            frame: data,
-            expected_brightness: BrightnessModel::default(),
-            settings: &config.align,
+        let frame_data = FrameData {
+            levels: &self.pyramid.levels,
+            depth: &self.depth,
+            depth_level: self.config.surface_level,
+            region: self.config.region,
         };
-        let coarsest = config.levels - 1;
-        let mut iterations = 0;
-        let mut best: Option<LevelOutcome> = None;
-        let mut best_score = f64::MAX;
-        for mid in candidates(local, frame, dt, config.hypotheses) {
-            let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
-            let mut estimate = Estimate {
-                keyframe_from_camera: ExposureTrajectory::from_mid_and_motion(&mid, &prior.expected),
-                brightness: self.brightness,
-            };
-            let mut outcome = None;
-            for level in [coarsest, coarsest - 1] {
-                let mid = estimate.keyframe_from_camera.mid();
-                let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
-                estimate.keyframe_from_camera =
-                    ExposureTrajectory::from_mid_and_motion(&mid, &prior.expected);
-                let result = align_level(&alignment, level, estimate, &prior, 4, &mut self.scratch);
-                iterations += result.iterations;
-                estimate = result.estimate;
-                outcome = Some(result);
-            }
-            if let Some(outcome) = outcome {
-                let score = hypothesis_score(&outcome);
-                if score < best_score {
-                    best_score = score;
-                    best = Some(outcome);
-                }
-            }
+        let task = FrameTask {
+            alignment: Alignment {
+                simd: self.simd,
+                camera: self.config.camera,
+                reference,
+                frame: frame_data,
+                expected_brightness: self.brightness,
+                settings: &self.config.align,
+            },
+            motion: world_motion.seen_from(&self.keyframe.world_from_keyframe.inverse()),
+            timestamp: frame.timestamp,
+            exposure: frame.exposure,
+            gyro: frame.angular_velocity,
+            brightness: self.brightness,
+            blur,
+            inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),
+            trusted_score: self.typical.score,
+        };
+        match start {
+            Some(mid) => task.run(&[mid], &mut self.scratch),
+            None => task.run(&task.guesses(), &mut self.scratch),
         }
-        let mut outcome = best.unwrap_or_else(|| unreachable_outcome(local));
-        for level in (0..coarsest - 1).rev() {
-            let mid = outcome.estimate.keyframe_from_camera.mid();
-            let prior = local.expected_motion(&mid, dt, frame.exposure, &config.camera, inverse_depth);
-            let estimate = oriented(outcome.estimate, &prior);
-            outcome = align_level(&alignment, level, estimate, &prior, 2, &mut self.scratch);
-            iterations += outcome.iterations;
-        }
-        (outcome, iterations)
     }
 
-    fn conclude(
+    fn judge(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> FrameStatus {
+        judge(outcome, &self.evidence(outcome, motion, frame), &self.typical)
+    }
+
+    fn evidence(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> Evidence {
+        let keypoints = self.keyframe.finest_keypoints();
+        let total = keypoints.len().max(1) as f32;
+        let mid = outcome.estimate.keyframe_from_camera.mid();
+        let path = ExposureTrajectory { start: RigidTransform::identity(), end: mid };
+        let rate = motion.reference_from_mid.tangent_to(&self.keyframe.world_from_keyframe.compose(&mid))
+            / (frame.timestamp - motion.timestamp);
+        Evidence {
+            overlap: outcome.patches_in_view as f32 / total,
+            inliers: outcome.patches as f32 / total,
+            flow: self.blur_length(&path),
+            blur: self.blur_length(&outcome.estimate.keyframe_from_camera),
+            depth_share: self.depth_share,
+            speed: rate.fixed_rows::<3>(0).norm(),
+            angular_speed: rate.fixed_rows::<3>(3).norm(),
+        }
+    }
+
+    /// Takes an alignment as the frame's poses.
+    fn accept(
         &mut self,
         frame: &Frame,
         motion: &Motion,
-        local: &Motion,
-        dt: f64,
-        outcome: LevelOutcome,
-        iterations: usize,
+        aligned: &Aligned,
+        status: FrameStatus,
     ) -> FrameResult {
-        let inverse_depth = typical_inverse_depth(&self.keyframe);
-        let mid = outcome.estimate.keyframe_from_camera.mid();
-        let prior = local.expected_motion(&mid, dt, frame.exposure, &self.config.camera, inverse_depth);
-        let estimate = oriented(outcome.estimate, &prior);
-        let blur =
-            blur_length(&estimate.keyframe_from_camera, self.keyframe.keypoints()[0], &self.config.camera);
-        let total = self.keyframe.keypoints()[0].len().max(1) as f32;
-        let world_from_camera = estimate.keyframe_from_camera.seen_from(&self.keyframe.world_from_keyframe);
+        let outcome = &aligned.outcome;
+        let evidence = self.evidence(outcome, motion, frame);
+        let world_from_camera =
+            outcome.estimate.keyframe_from_camera.seen_from(&self.keyframe.world_from_keyframe);
         let world_from_mid = world_from_camera.mid();
-        let in_view = outcome.patches_in_view as f32 / total;
-        let inliers = outcome.patches as f32 / total;
-        let flow = flow_length(&self.keyframe, &mid, &self.config);
-        let reference_index = self.keyframe.frame_index;
+        let mut result =
+            FrameResult::of(self.frames, frame.timestamp, world_from_camera, outcome, aligned.iterations);
+        result.status = status;
+        result.blur = evidence.blur;
+        result.inliers = evidence.inliers;
+        result.reference_index = self.keyframe.frame_index;
         self.motion = Some(Motion {
             timestamp: frame.timestamp,
             exposure: frame.exposure,
-            world_from_camera,
-            world_from_mid,
-            between_frames: motion.world_from_mid.tangent_to(&world_from_mid) / dt,
-            within_exposure: (frame.exposure > 0.0).then(|| world_from_camera.motion() / frame.exposure),
+            reference_from_mid: world_from_mid,
+            between_frames: motion.reference_from_mid.tangent_to(&world_from_mid)
+                / (frame.timestamp - motion.timestamp),
+            within_exposure: (self.config.align.blur && frame.exposure > 0.0)
+                .then(|| world_from_camera.motion() / frame.exposure),
         });
-        self.brightness = estimate.brightness;
-        let far = in_view < 0.6 || flow > 0.2 * self.config.camera.width as f32;
-        let sharper = blur + 1.0 < 0.6 * self.keyframe.blur;
-        let is_keyframe = far || sharper;
-        if is_keyframe {
-            self.promote(&world_from_mid, Some(world_from_camera.seen_from(&world_from_mid.inverse())), blur);
-            self.brightness = BrightnessModel::default();
+        self.brightness = outcome.estimate.brightness;
+        self.lost_frames = 0;
+        if status == FrameStatus::Ok {
+            self.typical.learn(outcome, aligned.score);
         }
-        FrameResult {
-            index: self.frames,
-            timestamp: frame.timestamp,
-            status: FrameStatus::Ok,
+        let wanted = wants_keyframe(&evidence, self.keyframe.blur, self.config.camera.width);
+        if status == FrameStatus::Ok && wanted {
+            self.keep_keyframe();
+            let exposure = world_from_camera.seen_from(&world_from_mid.inverse());
+            self.promote(&world_from_mid, Some(exposure), evidence.blur);
+            result.is_keyframe = true;
+        } else if status == FrameStatus::Ok {
+            let camera = self.config.camera.at_level(self.config.surface_level);
+            let keyframe_from_mid = outcome.estimate.keyframe_from_camera.mid();
+            self.keyframe.fuse_depth(&self.depth, &keyframe_from_mid, &camera);
+        }
+        result
+    }
+
+    /// Holds the last good pose.
+    fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned) -> FrameResult {
+        self.lost_frames += 1;
+        let held = Motion { between_frames: motion.between_frames * 0.5, within_exposure: None, ..*motion };
+        self.motion = Some(held);
+        let world_from_camera = ExposureTrajectory::still(motion.reference_from_mid);
+        let mut result = FrameResult::of(
+            self.frames,
+            frame.timestamp,
             world_from_camera,
-            information: outcome.information,
-            brightness: estimate.brightness,
-            blur,
-            virtual_views: outcome.views,
-            iterations,
-            residual: outcome.photometric_scale,
-            inliers,
-            depth_residual: outcome.depth_scale,
-            stop: outcome.stop,
-            is_keyframe,
-            reference_index,
+            &aligned.outcome,
+            aligned.iterations,
+        );
+        result.reference_index = self.keyframe.frame_index;
+        result
+    }
+
+    /// Looks for the current view among the keyframes; on success the motion starts anew from where it was found.
+    fn recover(&mut self, frame: &Frame, motion: &Motion) -> bool {
+        let region = self.config.region;
+        let skip = self.config.surface_level;
+        let view = FrameData {
+            levels: &self.pyramid.levels[skip..],
+            depth: &self.depth,
+            depth_level: 0,
+            region: region.at_level(skip),
+        };
+        let camera = self.config.camera.at_level(skip);
+        let found = self.recent.find(
+            self.simd,
+            &camera,
+            view,
+            &self.config.align,
+            motion,
+            frame.timestamp,
+            &mut self.scratch,
+        );
+        match found {
+            Some(world_from_mid) => {
+                self.motion = Some(Motion {
+                    timestamp: motion.timestamp,
+                    ..Motion::still(frame.timestamp, frame.exposure, world_from_mid)
+                });
+                true
+            }
+            None => false,
         }
     }
 
@@ -275,106 +419,52 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
-        self.keyframe.prepare(MIN_STRENGTH, self.config.align.dark_intensity);
-        if self.config.reference == ReferenceMode::Deblurred && blur > 1.0 {
-            self.sharpen_keyframe();
+        self.keyframe.restart_surface();
+        self.brightness = BrightnessModel::default();
+        let deblurred = self.sharpen_keyframe();
+        if !deblurred {
+            self.select_keypoints();
         }
     }
 
-    fn sharpen_keyframe(&mut self) {
-        let Some(exposure) = self.keyframe.keyframe_from_camera else { return };
-        let keyframe = &mut self.keyframe;
-        let typical = typical_inverse_depth(keyframe) as f32;
+    /// Deblurs the keyframe with its own motion and selects its keypoints; `false` if there is nothing to do.
+    fn sharpen_keyframe(&mut self) -> bool {
+        let Some(exposure) = self.keyframe.keyframe_from_camera else { return false };
+        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
+        if self.config.reference == ReferenceMode::Raw || !worth {
+            return false;
+        }
+        let typical = typical_inverse_depth(self.keyframe.finest_keypoints()) as f32;
         let longest = self.deblur.flow.fill(
             &exposure,
             &self.config.camera,
-            &keyframe.planes,
+            &self.keyframe.planes,
             self.config.surface_level,
             typical,
         );
-        let sharp = &mut keyframe.pyramid.levels[0];
-        keyframe.captured.copy_from_slice(sharp.pixels);
-        self.deblur.deblur(
-            self.simd,
-            longest,
-            self.config.deblur_iterations,
-            keyframe.captured,
-            sharp.pixels,
-        );
-        keyframe.pyramid.reduce();
-        keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity);
-        if let Some(sink) = self.config.debug {
-            sink(keyframe.frame_index, keyframe.captured, keyframe.pyramid.levels[0].pixels);
-        }
+        let image = &mut self.keyframe.pyramid.levels[0];
+        self.deblur.capture(image.pixels);
+        self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
+        self.keyframe.pyramid.reduce();
+        self.select_keypoints();
+        true
+    }
+
+    fn select_keypoints(&mut self) {
+        self.keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
+    }
+
+    /// Remembers the coarse part of the keyframe for recovery before it is replaced.
+    fn keep_keyframe(&mut self) {
+        self.recent.remember(&self.keyframe, self.config.surface_level);
+    }
+
+    fn blur_length(&self, keyframe_from_camera: &ExposureTrajectory) -> f32 {
+        blur_length(keyframe_from_camera, self.keyframe.finest_keypoints(), &self.config.camera)
     }
 }
 
-/// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
-const MIN_STRENGTH: f32 = 0.02;
-
-fn rotate_translation(a_from_b: &RigidTransform, rate: &Vector6<f64>) -> Vector6<f64> {
-    let mut rotated = *rate;
-    let translation = a_from_b.rotation * rate.fixed_rows::<3>(0).into_owned();
-    rotated.fixed_rows_mut::<3>(0).copy_from(&translation);
-    rotated
-}
-
-/// First guesses of the mid pose, most likely first.
-fn candidates(local: &Motion, frame: &Frame, dt: f64, several: bool) -> ArrayVec<RigidTransform, 6> {
-    let mut list = ArrayVec::new();
-    if let Some(gyro) = frame.angular_velocity {
-        list.push(local.extrapolate_with_gyro(&local.between_frames, &gyro, dt));
-    }
-    list.push(local.extrapolate(&local.between_frames, dt));
-    if several {
-        if let Some(rate) = local.within_exposure {
-            list.push(local.extrapolate(&rate, dt));
-        }
-        list.push(local.world_from_mid);
-        list.push(local.extrapolate(&-local.between_frames, dt));
-    }
-    list
-}
-
-fn hypothesis_score(outcome: &LevelOutcome) -> f64 {
-    let lost = 1.0 - outcome.patches as f64 / outcome.patches_in_view.max(1) as f64;
-    f64::from(outcome.photometric_scale) * (1.0 + lost) * (1.0 + 100.0 * f64::from(outcome.depth_scale))
-}
-
-fn oriented(estimate: Estimate, prior: &MotionPrior) -> Estimate {
-    let whitened = prior.information.component_mul(&prior.expected);
-    if estimate.keyframe_from_camera.motion().dot(&whitened) < 0.0 {
-        Estimate { keyframe_from_camera: estimate.keyframe_from_camera.reversed(), ..estimate }
-    } else {
-        estimate
-    }
-}
-
-fn typical_inverse_depth(keyframe: &Keyframe) -> f64 {
-    let keypoints = keyframe.keypoints();
-    keypoints[0].get(keypoints[0].len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
-}
-
-fn flow_length(keyframe: &Keyframe, keyframe_from_mid: &RigidTransform, config: &TrackerConfig) -> f32 {
-    let path = ExposureTrajectory { start: RigidTransform::identity(), end: *keyframe_from_mid };
-    blur_length(&path, keyframe.keypoints()[0], &config.camera)
-}
-
-fn unreachable_outcome(local: &Motion) -> LevelOutcome {
-    LevelOutcome {
-        estimate: Estimate {
-            keyframe_from_camera: local.world_from_camera,
-            brightness: BrightnessModel::default(),
-        },
-        stop: StopReason::NoData,
-        iterations: 0,
-        views: 1,
-        photometric_scale: 0.0,
-        depth_scale: 0.0,
-        patches: 0,
-        patches_in_view: 0,
-        depth_points: 0,
-        information: nalgebra::SMatrix::zeros(),
-        cost: 0.0,
-    }
+/// Inverse depth of the middle keypoint, 1/m.
+pub(super) fn typical_inverse_depth(keypoints: &[Keypoint]) -> f64 {
+    keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
 }

@@ -5,14 +5,15 @@
 //! within a patch and f64 across patches, and saves all but a fraction of the 119 horizontal sums per patch.
 
 use fearless_simd::prelude::*;
+use nalgebra::{SMatrix, SVector};
 
 use super::evaluate::{PatchCost, PhotometricSums, ResidualModel};
-use super::kernel::load;
+use super::kernel::{load, store};
 use super::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 use super::problem::{BrightnessModel, LevelImage, PatchRows, PatchSite, PatchValues, ROW_LENGTH};
 
-/// Products of two columns of (row, residual), upper triangle without the squared residual.
-const ENTRIES: usize = ROW_LENGTH * (ROW_LENGTH + 1) / 2 + ROW_LENGTH;
+/// Vectors of a patch when a vector has the least number of lanes, four.
+const MAX_VECTORS: usize = PATCH_PIXELS / 4;
 
 /// The residual stands behind the row, as if it were one more column.
 const RESIDUAL: usize = ROW_LENGTH;
@@ -87,11 +88,18 @@ impl<'a, S: Simd> Whitening<'a, S> {
     }
 }
 
+/// Aligned, so that no vector straddles two cache lines.
+#[repr(align(64))]
+struct Columns([[f32; PATCH_PIXELS]; ROW_LENGTH + 1]);
+
 /// Normal equations while they are being summed.
 pub(super) struct NormalEquations<S: Simd> {
     simd: S,
-    lanes: [S::f32s; ENTRIES],
-    totals: [f64; ENTRIES],
+    /// The columns of one patch: row and residual of every pixel.
+    columns: Columns,
+    /// `lanes[i][j]`: products of columns i and j, of which those with `i <= j` are summed.
+    lanes: [[S::f32s; ROW_LENGTH + 1]; ROW_LENGTH],
+    totals: [[f64; ROW_LENGTH + 1]; ROW_LENGTH],
     cost: f64,
     pixels: f64,
     pending_patches: usize,
@@ -103,8 +111,9 @@ impl<S: Simd> NormalEquations<S> {
         let zero = S::f32s::splat(simd, 0.0);
         Self {
             simd,
-            lanes: [zero; ENTRIES],
-            totals: [0.0; ENTRIES],
+            columns: Columns([[0.0; PATCH_PIXELS]; ROW_LENGTH + 1]),
+            lanes: [[zero; ROW_LENGTH + 1]; ROW_LENGTH],
+            totals: [[0.0; ROW_LENGTH + 1]; ROW_LENGTH],
             cost: 0.0,
             pixels: 0.0,
             pending_patches: 0,
@@ -121,8 +130,9 @@ impl<S: Simd> NormalEquations<S> {
             let whitened = whitening.whiten(&rows.values, &observed, k);
             cost += whitened.cost;
             count += whitened.count;
-            self.add_products(&self.columns(whitening.brightness.gain, &whitened, rows, k));
+            self.store_columns(whitening.brightness.gain, &whitened, rows, k);
         }
+        self.add_products();
         let patch = PatchCost { cost: cost.reduce_sum(), pixels: count.reduce_sum() };
         self.cost += f64::from(patch.cost);
         self.pixels += f64::from(patch.pixels);
@@ -136,40 +146,60 @@ impl<S: Simd> NormalEquations<S> {
 
     /// Row and residual, both times the square root of the weight.
     #[inline(always)]
-    fn columns(
-        &self,
-        gain: f32,
-        whitened: &Whitened<S>,
-        rows: &PatchRows,
-        k: usize,
-    ) -> [S::f32s; ROW_LENGTH + 1] {
+    fn store_columns(&mut self, gain: f32, whitened: &Whitened<S>, rows: &PatchRows, k: usize) {
         let root = whitened.weight.sqrt();
         let scale = root * whitened.inverse_sigma;
         let pose_scale = scale * gain;
-        core::array::from_fn(|i| match i {
-            0..12 => load(self.simd, &rows.pose[i], k) * pose_scale,
-            12 => load(self.simd, &rows.values.mean, k) * scale,
-            13 => scale,
-            _ => whitened.residual * root,
-        })
+        let (pose, rest) = self.columns.0.split_at_mut(rows.pose.len());
+        for (column, derivative) in pose.iter_mut().zip(&rows.pose) {
+            store(load(self.simd, derivative, k) * pose_scale, column, k);
+        }
+        let mean = load(self.simd, &rows.values.mean, k);
+        for (column, value) in rest.iter_mut().zip([mean * scale, scale, whitened.residual * root]) {
+            store(value, column, k);
+        }
     }
 
+    /// Two rows of the matrix at a time, so that every column that is read serves two products.
     #[inline(always)]
-    fn add_products(&mut self, columns: &[S::f32s; ROW_LENGTH + 1]) {
-        let mut entry = 0;
-        for i in 0..ROW_LENGTH {
-            for j in i..=RESIDUAL {
-                self.lanes[entry] = columns[i].mul_add(columns[j], self.lanes[entry]);
-                entry += 1;
+    fn add_products(&mut self) {
+        for i in (0..ROW_LENGTH).step_by(2) {
+            let [first, second] = [self.vectors(i), self.vectors(i + 1)];
+            self.lanes[i][i] = self.add_dot(&first, &first, self.lanes[i][i]);
+            for j in i + 1..=RESIDUAL {
+                let column = self.vectors(j);
+                self.lanes[i][j] = self.add_dot(&first, &column, self.lanes[i][j]);
+                self.lanes[i + 1][j] = self.add_dot(&second, &column, self.lanes[i + 1][j]);
             }
         }
     }
 
+    /// The vectors of a column; those past the end of the patch are never read.
+    #[inline(always)]
+    fn vectors(&self, column: usize) -> [S::f32s; MAX_VECTORS] {
+        core::array::from_fn(
+            #[inline(always)]
+            |vector| load(self.simd, &self.columns.0[column], vector * S::f32s::LEN % PATCH_PIXELS),
+        )
+    }
+
+    #[inline(always)]
+    fn add_dot(&self, a: &[S::f32s; MAX_VECTORS], b: &[S::f32s; MAX_VECTORS], sum: S::f32s) -> S::f32s {
+        let vectors = PATCH_PIXELS / S::f32s::LEN;
+        a.iter().zip(b).take(vectors).fold(
+            sum,
+            #[inline(always)]
+            |sum, (&a, &b)| a.mul_add(b, sum),
+        )
+    }
+
     #[inline(always)]
     fn flush(&mut self) {
-        for (total, lanes) in self.totals.iter_mut().zip(&mut self.lanes) {
-            *total += f64::from(lanes.reduce_sum());
-            *lanes = S::f32s::splat(self.simd, 0.0);
+        for (i, (totals, lanes)) in self.totals.iter_mut().zip(&mut self.lanes).enumerate() {
+            for (total, lanes) in totals[i..].iter_mut().zip(&mut lanes[i..]) {
+                *total += f64::from(lanes.reduce_sum());
+                *lanes = S::f32s::splat(self.simd, 0.0);
+            }
         }
         self.pending_patches = 0;
     }
@@ -178,20 +208,12 @@ impl<S: Simd> NormalEquations<S> {
     #[inline(always)]
     pub(super) fn finish(mut self) -> PhotometricSums {
         self.flush();
-        let mut sums = PhotometricSums { cost: self.cost, pixels: self.pixels, ..PhotometricSums::default() };
-        let mut entries = self.totals.iter();
-        for i in 0..ROW_LENGTH {
-            for j in i..=RESIDUAL {
-                let entry = entries.next().copied().unwrap_or(0.0);
-                if j == RESIDUAL {
-                    sums.gradient[i] = entry;
-                } else {
-                    sums.hessian[(i, j)] = entry;
-                    sums.hessian[(j, i)] = entry;
-                }
-            }
+        PhotometricSums {
+            cost: self.cost,
+            pixels: self.pixels,
+            hessian: SMatrix::from_fn(|i, j| self.totals[i.min(j)][i.max(j)]),
+            gradient: SVector::from_fn(|i, _| self.totals[i][RESIDUAL]),
         }
-        sums
     }
 }
 

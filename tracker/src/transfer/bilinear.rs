@@ -11,7 +11,7 @@ const MAX_PIXELS: usize = 1 << 24;
 ///
 /// Four neighbours are read as two pairs of adjacent floats, one 64-bit load each: measured against a hardware
 /// gather this is faster on every CPU tried and needs no `unsafe`.
-pub(crate) struct BilinearSampler<'a, S: Simd> {
+pub(super) struct BilinearSampler<'a, S: Simd> {
     simd: S,
     /// All rows but the last, and all rows but the first: an index into one is the cell above or below.
     top: &'a [f32],
@@ -23,17 +23,34 @@ pub(crate) struct BilinearSampler<'a, S: Simd> {
     last_cell_v: S::f32s,
 }
 
+/// Where a sample lies: the linear index of its top left pixel and the position between the four.
+#[derive(Clone, Copy)]
+pub(super) struct Cell<S: Simd> {
+    index: S::i32s,
+    fraction_u: S::f32s,
+    fraction_v: S::f32s,
+}
+
+impl<S: Simd> Cell<S> {
+    /// The first cell of any image.
+    #[inline(always)]
+    pub(super) fn first(simd: S) -> Self {
+        let zero = S::f32s::splat(simd, 0.0);
+        Self { index: S::i32s::splat(simd, 0), fraction_u: zero, fraction_v: zero }
+    }
+}
+
 /// Interpolated intensities and, per pixel of displacement, their derivatives.
-pub(crate) struct Sampled<S: Simd> {
-    pub(crate) value: S::f32s,
-    pub(crate) gradient_u: S::f32s,
-    pub(crate) gradient_v: S::f32s,
+pub(super) struct Sampled<S: Simd> {
+    pub(super) value: S::f32s,
+    pub(super) gradient_u: S::f32s,
+    pub(super) gradient_v: S::f32s,
 }
 
 impl<'a, S: Simd> BilinearSampler<'a, S> {
     /// `None` if the image is narrower than one cell, larger than 2^24 pixels or shorter than it claims.
     #[inline(always)]
-    pub(crate) fn new(simd: S, image: &LevelImage<'a>) -> Option<Self> {
+    pub(super) fn new(simd: S, image: &LevelImage<'a>) -> Option<Self> {
         let (width, height) = (image.width, image.height);
         let count = width.checked_mul(height).filter(|&count| count <= MAX_PIXELS)?;
         let pixels = image.pixels.get(..count)?;
@@ -57,33 +74,34 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
 
     /// Lanes within `[0, W-1] x [0, H-1]`; false for NaN.
     #[inline(always)]
-    pub(crate) fn contains(&self, u: S::f32s, v: S::f32s) -> S::mask32s {
+    pub(super) fn contains(&self, u: S::f32s, v: S::f32s) -> S::mask32s {
         (u.simd_ge(0.0) & u.simd_le(self.last_u)) & (v.simd_ge(0.0) & v.simd_le(self.last_v))
     }
 
-    /// The nearest point of `[0, W-1] x [0, H-1]`.
+    /// The cell that holds `(u, v)`; lanes outside the image get some cell of it.
     #[inline(always)]
-    pub(crate) fn clamp(&self, u: S::f32s, v: S::f32s) -> (S::f32s, S::f32s) {
-        (u.max(0.0).min(self.last_u), v.max(0.0).min(self.last_v))
-    }
-
-    /// Samples at `(u, v)`. Lanes outside the image return something unspecified, possibly NaN.
-    #[inline(always)]
-    pub(crate) fn sample(&self, u: S::f32s, v: S::f32s) -> Sampled<S> {
+    pub(super) fn locate(&self, u: S::f32s, v: S::f32s) -> Cell<S> {
         // Truncation is floor for valid lanes. Clamping after it makes the cell valid whatever the lane holds.
         let cell_u = truncate::<S>(u).max(0.0).min(self.last_cell_u);
         let cell_v = truncate::<S>(v).max(0.0).min(self.last_cell_v);
         let index = cell_v.mul_add(self.width, cell_u).to_int::<S::i32s>();
-        let (fu, fv) = (u - cell_u, v - cell_v);
-        let (i00, i01) = self.pairs(self.top, &index);
-        let (i10, i11) = self.pairs(self.bottom, &index);
+        Cell { index, fraction_u: u - cell_u, fraction_v: v - cell_v }
+    }
+
+    /// Interpolates within a cell. Lanes outside the image return something unspecified, possibly NaN.
+    #[inline(always)]
+    pub(super) fn sample(&self, cell: &Cell<S>) -> Sampled<S> {
+        // Says to the compiler that the lengths are equal: what is in bounds of one is in bounds of the other.
+        let bottom = &self.bottom[..self.top.len()];
+        let (i00, i01) = self.pairs(self.top, &cell.index);
+        let (i10, i11) = self.pairs(bottom, &cell.index);
         let (du_top, du_bottom) = (i01 - i00, i11 - i10);
-        let t0 = du_top.mul_add(fu, i00);
-        let t1 = du_bottom.mul_add(fu, i10);
+        let t0 = du_top.mul_add(cell.fraction_u, i00);
+        let t1 = du_bottom.mul_add(cell.fraction_u, i10);
         let gradient_v = t1 - t0;
         Sampled {
-            value: gradient_v.mul_add(fv, t0),
-            gradient_u: (du_bottom - du_top).mul_add(fv, du_top),
+            value: gradient_v.mul_add(cell.fraction_v, t0),
+            gradient_u: (du_bottom - du_top).mul_add(cell.fraction_v, du_top),
             gradient_v,
         }
     }
@@ -92,9 +110,9 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
     #[inline(always)]
     fn pairs(&self, rows: &[f32], index: &S::i32s) -> (S::f32s, S::f32s) {
         let index = index.as_slice();
-        let half = S::u64s::LEN;
-        let low: S::f32s = S::u64s::from_fn(self.simd, |k| pair(rows, index[k])).bitcast();
-        let high: S::f32s = S::u64s::from_fn(self.simd, |k| pair(rows, index[half + k])).bitcast();
+        let half = S::f64s::LEN;
+        let low: S::f32s = S::f64s::from_fn(self.simd, |k| pair(rows, index[k])).bitcast();
+        let high: S::f32s = S::f64s::from_fn(self.simd, |k| pair(rows, index[half + k])).bitcast();
         (low.unzip_low(high), low.unzip_high(high))
     }
 }
@@ -106,7 +124,8 @@ fn truncate<S: Simd>(x: S::f32s) -> S::f32s {
 
 /// Two adjacent pixels in one word; the caller clamps `index`, so the bounds check never fails.
 #[inline(always)]
-fn pair(rows: &[f32], index: i32) -> u64 {
+fn pair(rows: &[f32], index: i32) -> f64 {
     let start = index as u32 as usize;
-    bytemuck::cast([rows[start], rows[start + 1]])
+    let cells = &rows[start..start + 2];
+    bytemuck::cast([cells[0], cells[1]])
 }

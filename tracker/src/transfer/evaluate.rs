@@ -110,7 +110,7 @@ fn cost_of_patches<S: Simd>(
     patches: &mut [PatchCost],
 ) -> PatchCost {
     patches.fill(PatchCost::default());
-    let Some(kernel) = TransferKernel::new(simd, problem) else { return PatchCost::default() };
+    let Some(mut kernel) = TransferKernel::new(simd, problem) else { return PatchCost::default() };
     let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
     let mut values = PatchValues::default();
     let (mut cost, mut pixels) = (0.0, 0.0);
@@ -132,7 +132,7 @@ fn sums_of_patches<S: Simd>(
     patches: &mut [PatchCost],
 ) -> PhotometricSums {
     patches.fill(PatchCost::default());
-    let Some(kernel) = TransferKernel::new(simd, problem) else { return PhotometricSums::default() };
+    let Some(mut kernel) = TransferKernel::new(simd, problem) else { return PhotometricSums::default() };
     let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
     let mut rows = PatchRows::default();
     let mut sums = NormalEquations::new(simd);
@@ -150,7 +150,9 @@ fn values_of_patches<S: Simd>(
     sites: &[PatchSite],
     out: &mut [PatchValues],
 ) {
-    let Some(kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchValues::default()) };
+    let Some(mut kernel) = TransferKernel::new(simd, problem) else {
+        return out.fill(PatchValues::default());
+    };
     for (site, values) in sites.iter().zip(out) {
         kernel.patch_values(site, values);
     }
@@ -158,7 +160,7 @@ fn values_of_patches<S: Simd>(
 
 #[inline(always)]
 fn rows_of_patches<S: Simd>(simd: S, problem: &TransferProblem, sites: &[PatchSite], out: &mut [PatchRows]) {
-    let Some(kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchRows::default()) };
+    let Some(mut kernel) = TransferKernel::new(simd, problem) else { return out.fill(PatchRows::default()) };
     for (site, rows) in sites.iter().zip(out) {
         kernel.patch_rows(site, rows);
     }

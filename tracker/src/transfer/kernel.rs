@@ -2,9 +2,11 @@
 //!
 //! # Layout
 //!
-//! A lane is a pixel of the patch. The 32 pattern pixels are 2, 4 or 8 vectors; for each of them the loop over
-//! the virtual views runs with all sums in registers. What a patch and a view share ([`PatchView`]) is computed
-//! once per patch, what a view shares among all patches ([`VirtualView`]) once per evaluation.
+//! A lane is a pixel of the patch; the 32 pattern pixels are 2, 4 or 8 vectors. For each of them the virtual
+//! views are taken in batches: first every sample of the batch is located, then every sample is read and summed.
+//! In one go a sample is a chain of some 90 cycles from division to interpolation, more than the processor can
+//! overlap with the next; in two passes the chains are short. What a patch and a view share ([`PatchView`]) is
+//! computed once per patch, what a view shares among all patches ([`VirtualView`]) once per evaluation.
 //!
 //! # Cost
 //!
@@ -13,19 +15,22 @@
 //!
 //! # Invalid pixels
 //!
-//! Nothing branches on validity: indices are clamped, and lanes that left the image, passed the plane or met a
-//! NaN are dropped at the end by comparisons that NaN fails.
+//! Nothing branches on the validity of a lane: indices are clamped, and lanes that left the image, passed the
+//! plane or met a NaN are dropped at the end by comparisons that NaN fails.
 
-use arrayvec::ArrayVec;
 use fearless_simd::prelude::*;
 
-use super::bilinear::{BilinearSampler, Sampled};
+use super::bilinear::{BilinearSampler, Cell, Sampled};
 use super::pattern::{PATCH_PIXELS, PATTERN_DU_F32, PATTERN_DV_F32};
 use super::problem::{PatchRows, PatchSite, PatchValues, TransferProblem};
 use super::reference::{MIN_PLANE_DISTANCE, MIN_RAY_Z};
 use super::virtual_view::{MAX_VIRTUAL_VIEWS, VirtualView};
 
+/// Virtual views whose samples are located before the first of them is read.
+const BATCH: usize = 8;
+
 /// What a patch and a virtual view share for all pixels of the patch.
+#[derive(Clone, Copy, Default)]
 struct PatchView {
     /// Viewing ray of the patch centre in the reference frame.
     ray: [f32; 3],
@@ -37,14 +42,13 @@ struct PatchView {
     end_weights: [f32; 2],
 }
 
-/// Pixels of the virtual view transferred into the reference image.
-struct Transferred<S: Simd> {
-    u: S::f32s,
-    v: S::f32s,
+/// One vector of pixels of a virtual view, located in the reference image.
+#[derive(Clone, Copy)]
+struct Located<S: Simd> {
+    cell: Cell<S>,
     /// `r_x/r_z` and `r_y/r_z` of the viewing ray in the reference frame.
     a: S::f32s,
     b: S::f32s,
-    ray_z: S::f32s,
 }
 
 /// Sums over the virtual views of one vector of pixels.
@@ -62,7 +66,11 @@ pub(super) struct TransferKernel<'a, S: Simd> {
     problem: &'a TransferProblem<'a>,
     views: &'a [VirtualView],
     sampler: BilinearSampler<'a, S>,
+    /// `1/n` for n views.
     scale: f32,
+    inverse_focal: [f32; 2],
+    patch_views: [PatchView; MAX_VIRTUAL_VIEWS],
+    batch: [Located<S>; BATCH],
 }
 
 impl<'a, S: Simd> TransferKernel<'a, S> {
@@ -73,28 +81,34 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
         if views.is_empty() {
             return None;
         }
-        let sampler = BilinearSampler::new(simd, &problem.reference)?;
-        Some(Self { simd, problem, views, sampler, scale: 1.0 / views.len() as f32 })
+        let zero = S::f32s::splat(simd, 0.0);
+        Some(Self {
+            simd,
+            problem,
+            views,
+            sampler: BilinearSampler::new(simd, &problem.reference)?,
+            scale: 1.0 / views.len() as f32,
+            inverse_focal: problem.focal.map(|focal| 1.0 / focal),
+            patch_views: [PatchView::default(); MAX_VIRTUAL_VIEWS],
+            batch: [Located { cell: Cell::first(simd), a: zero, b: zero }; BATCH],
+        })
     }
 
     /// Predicted intensities of a patch.
     #[inline(always)]
-    pub(super) fn patch_values(&self, site: &PatchSite, out: &mut PatchValues) {
-        let Some(patch_views) = self.patch_views(site) else {
+    pub(super) fn patch_values(&mut self, site: &PatchSite, out: &mut PatchValues) {
+        if !self.prepare(site) {
             *out = PatchValues::default();
             return;
-        };
+        }
         for k in (0..PATCH_PIXELS).step_by(S::f32s::LEN) {
-            let mut valid = self.observed(site, k);
             let mut sum = S::f32s::splat(self.simd, 0.0);
-            for (view, patch_view) in self.views.iter().zip(&patch_views) {
-                let t = self.transfer(view, patch_view, k);
-                valid &= self.accepts(&t);
-                if valid.all_false() {
-                    break;
-                }
-                sum += self.sampler.sample(t.u, t.v).value;
-            }
+            let valid = self.for_each_sample(
+                site,
+                k,
+                #[inline(always)]
+                |_, _, _, sampled| sum += sampled.value,
+            );
             self.store_values(k, sum, valid, out);
         }
     }
@@ -102,72 +116,71 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     /// Predicted intensities of a patch and their derivatives by the poses at shutter opening and closing, for
     /// left rotations.
     #[inline(always)]
-    pub(super) fn patch_rows(&self, site: &PatchSite, out: &mut PatchRows) {
-        let Some(patch_views) = self.patch_views(site) else {
+    pub(super) fn patch_rows(&mut self, site: &PatchSite, out: &mut PatchRows) {
+        if !self.prepare(site) {
             *out = PatchRows::default();
             return;
-        };
+        }
         for k in (0..PATCH_PIXELS).step_by(S::f32s::LEN) {
-            let mut valid = self.observed(site, k);
             let mut sums = RowSums::zero(self.simd);
-            for (view, patch_view) in self.views.iter().zip(&patch_views) {
-                let t = self.transfer(view, patch_view, k);
-                valid &= self.accepts(&t);
-                if valid.all_false() {
-                    break;
-                }
-                sums.add(view, patch_view, &t, &self.sampler.sample(t.u, t.v));
-            }
+            let valid = self.for_each_sample(
+                site,
+                k,
+                #[inline(always)]
+                |view, patch_view, located, sampled| sums.add(view, patch_view, located, sampled),
+            );
             self.store_rows(k, &sums, valid, out);
         }
     }
 
-    /// `None` if the plane is behind or too near to one of the virtual cameras.
+    /// Computes what patch and views share. False if the plane is behind or too near to a virtual camera.
     #[inline(always)]
-    fn patch_views(&self, site: &PatchSite) -> Option<ArrayVec<PatchView, MAX_VIRTUAL_VIEWS>> {
+    fn prepare(&mut self, site: &PatchSite) -> bool {
         let [fx, fy] = self.problem.focal;
         let [cx, cy] = self.problem.centre;
-        let x = (f32::from(site.u) - cx) / fx;
-        let y = (f32::from(site.v) - cy) / fy;
+        let x = (f32::from(site.u) - cx) * self.inverse_focal[0];
+        let y = (f32::from(site.v) - cy) * self.inverse_focal[1];
         let rho = site.inverse_depth;
         let depth = 1.0 / rho;
-        let mut patch_views = ArrayVec::new();
-        for view in self.views {
+        let mut in_front = rho > 0.0;
+        for (view, patch_view) in self.views.iter().zip(&mut self.patch_views) {
             let distance = depth - view.position[2];
-            if !(distance > MIN_PLANE_DISTANCE && rho > 0.0) {
-                return None;
-            }
+            in_front &= distance > MIN_PLANE_DISTANCE;
             let per_distance = 1.0 / distance;
-            patch_views.push(PatchView {
+            *patch_view = PatchView {
                 ray: core::array::from_fn(|i| {
                     view.rotation[i][0] * x + view.rotation[i][1] * y + view.rotation[i][2]
                 }),
                 slope: [fx * rho * distance, fy * rho * distance],
                 shift: [cx + fx * rho * view.position[0], cy + fy * rho * view.position[1]],
                 end_weights: [(1.0 - view.time) * per_distance, view.time * per_distance],
-            });
+            };
         }
-        Some(patch_views)
+        in_front
     }
 
+    /// Calls `add` with every sample of the pixels `k..` and returns the pixels of which all samples are valid;
+    /// stops early if there are none.
     #[inline(always)]
-    fn transfer(&self, view: &VirtualView, patch_view: &PatchView, k: usize) -> Transferred<S> {
-        let ray = |i: usize| load(self.simd, &view.pattern_offset[i], k) + patch_view.ray[i];
-        let ray_z = ray(2);
-        let z = S::f32s::splat(self.simd, 1.0) / ray_z;
-        let (a, b) = (ray(0) * z, ray(1) * z);
-        Transferred {
-            u: a.mul_add(patch_view.slope[0], patch_view.shift[0]),
-            v: b.mul_add(patch_view.slope[1], patch_view.shift[1]),
-            a,
-            b,
-            ray_z,
+    fn for_each_sample(
+        &mut self,
+        site: &PatchSite,
+        k: usize,
+        mut add: impl FnMut(&VirtualView, &PatchView, &Located<S>, &Sampled<S>),
+    ) -> S::mask32s {
+        let mut valid = self.observed(site, k);
+        for (views, patch_views) in self.views.chunks(BATCH).zip(self.patch_views.chunks(BATCH)) {
+            for ((view, patch_view), located) in views.iter().zip(patch_views).zip(&mut self.batch) {
+                valid &= locate(self.simd, &self.sampler, view, patch_view, k, located);
+            }
+            if valid.all_false() {
+                break;
+            }
+            for ((view, patch_view), located) in views.iter().zip(patch_views).zip(&self.batch) {
+                add(view, patch_view, located, &self.sampler.sample(&located.cell));
+            }
         }
-    }
-
-    #[inline(always)]
-    fn accepts(&self, t: &Transferred<S>) -> S::mask32s {
-        t.ray_z.simd_gt(MIN_RAY_Z) & self.sampler.contains(t.u, t.v)
+        valid
     }
 
     /// Pattern pixels of the patch that lie in the current image.
@@ -201,6 +214,26 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     }
 }
 
+/// Transfers the pixels `k..` of a virtual view into the reference image; returns the lanes that are valid.
+#[inline(always)]
+fn locate<S: Simd>(
+    simd: S,
+    sampler: &BilinearSampler<S>,
+    view: &VirtualView,
+    patch_view: &PatchView,
+    k: usize,
+    located: &mut Located<S>,
+) -> S::mask32s {
+    let ray = |i: usize| load(simd, &view.pattern_offset[i], k) + patch_view.ray[i];
+    let ray_z = ray(2);
+    let z = S::f32s::splat(simd, 1.0) / ray_z;
+    let (a, b) = (ray(0) * z, ray(1) * z);
+    let u = a.mul_add(patch_view.slope[0], patch_view.shift[0]);
+    let v = b.mul_add(patch_view.slope[1], patch_view.shift[1]);
+    *located = Located { cell: sampler.locate(u, v), a, b };
+    ray_z.simd_gt(MIN_RAY_Z) & sampler.contains(u, v)
+}
+
 impl<S: Simd> RowSums<S> {
     #[inline(always)]
     fn zero(simd: S) -> Self {
@@ -217,7 +250,7 @@ impl<S: Simd> RowSums<S> {
     /// Adds one virtual view. With `A = g_u m_u`, `C = g_v m_v` and `e = a A + b C`, the row for a left rotation
     /// is `(-(b e + C), a e + A, a C - b A)` and that for a translation `(A, C, -e)/w`.
     #[inline(always)]
-    fn add(&mut self, view: &VirtualView, patch_view: &PatchView, t: &Transferred<S>, sampled: &Sampled<S>) {
+    fn add(&mut self, view: &VirtualView, patch_view: &PatchView, t: &Located<S>, sampled: &Sampled<S>) {
         let along_u = sampled.gradient_u * patch_view.slope[0];
         let along_v = sampled.gradient_v * patch_view.slope[1];
         let e = t.a.mul_add(along_u, t.b * along_v);

@@ -14,7 +14,6 @@ mod problem;
 pub mod reference;
 mod virtual_view;
 
-pub(crate) use bilinear::BilinearSampler;
 pub use evaluate::{
     PatchCost, PhotometricSums, ResidualModel, accumulate_rows, evaluate_cost, huber, linearize,
     transfer_rows, transfer_values,

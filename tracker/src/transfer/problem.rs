@@ -65,8 +65,9 @@ pub struct TransferProblem<'a> {
     pub brightness: BrightnessModel,
 }
 
-/// Predicted intensities of a patch, before gain and offset.
+/// Predicted intensities of a patch, before gain and offset; aligned for whole vectors.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
 pub struct PatchValues {
     /// Mean reference intensity over the virtual views, per pattern pixel.
     pub mean: [f32; PATCH_PIXELS],
@@ -80,8 +81,9 @@ impl Default for PatchValues {
     }
 }
 
-/// Predicted intensities and their derivatives.
+/// Predicted intensities and their derivatives; aligned for whole vectors.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C, align(64))]
 pub struct PatchRows {
     /// Predicted intensities.
     pub values: PatchValues,

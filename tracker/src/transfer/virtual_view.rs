@@ -11,8 +11,13 @@ use crate::trajectory::{ExposureTrajectory, SampleRule};
 pub const MAX_VIRTUAL_VIEWS: usize = 32;
 
 /// One sharp virtual view of an exposure, in the precision of the kernels.
+///
+/// Aligned and with the arrays first, so that no vector of them straddles two cache lines.
 #[derive(Clone, Debug)]
+#[repr(C, align(64))]
 pub struct VirtualView {
+    /// `R (du/fx, dv/fy, 0)` of every pattern pixel: one array per component.
+    pub pattern_offset: [[f32; PATCH_PIXELS]; 3],
     /// Rows of R in `reference_from_camera`.
     pub rotation: [[f32; 3]; 3],
     /// Camera centre in the reference frame, metres.
@@ -21,8 +26,6 @@ pub struct VirtualView {
     pub blend_left: [[f32; 3]; 3],
     /// Normalised time of the view in the exposure, `[0, 1]`.
     pub time: f32,
-    /// `R (du/fx, dv/fy, 0)` of every pattern pixel: one array per component.
-    pub pattern_offset: [[f32; PATCH_PIXELS]; 3],
 }
 
 impl VirtualView {

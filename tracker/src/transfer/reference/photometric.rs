@@ -76,8 +76,8 @@ fn add_row(
     for i in 0..ROW_LENGTH {
         let weighted = weight * row[i];
         g[i] += weighted * r;
-        for j in i..ROW_LENGTH {
-            h[i][j] += weighted * row[j];
+        for (sum, entry) in h[i][i..].iter_mut().zip(&row[i..]) {
+            *sum += weighted * entry;
         }
     }
 }
@@ -92,8 +92,8 @@ fn add_patch(
     sums.pixels += f64::from(patch.pixels);
     for i in 0..ROW_LENGTH {
         sums.gradient[i] += f64::from(g[i]);
-        for j in i..ROW_LENGTH {
-            sums.hessian[(i, j)] += f64::from(h[i][j]);
+        for (j, &product) in h[i].iter().enumerate().skip(i) {
+            sums.hessian[(i, j)] += f64::from(product);
         }
     }
 }

@@ -1,0 +1,4 @@
+//! The tracker against published formulas evaluated with 60 decimal digits.
+
+mod geometry;
+mod transfer;

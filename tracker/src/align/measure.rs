@@ -1,0 +1,97 @@
+//! Noise scales and outliers at the current estimate, before a linearisation.
+
+use super::depth_term::{DepthProblem, gate_for};
+use super::objective::{AlignScratch, DepthPart, Objective};
+use super::scale::median;
+use super::{AlignSettings, Estimate};
+use crate::trajectory::SampleRule;
+use crate::transfer::{self, PatchCost, ResidualModel, virtual_views};
+
+/// Nominal variance per unit of light; the measured scale multiplies it.
+pub(super) const NOMINAL_PHOTON_VARIANCE: f32 = 1e-4;
+
+/// Fewest depth points for a depth term.
+const MIN_DEPTH_POINTS: usize = 100;
+
+/// Noise model before anything is measured.
+pub(super) fn nominal_model(settings: &AlignSettings) -> ResidualModel {
+    ResidualModel {
+        read_variance: NOMINAL_PHOTON_VARIANCE * settings.dark_intensity,
+        photon_variance: NOMINAL_PHOTON_VARIANCE,
+        huber: settings.huber,
+    }
+}
+
+/// Measures the photometric noise scale at `estimate` over the first `in_view` sites of the scratch, drops
+/// outlier patches and sets the noise model; returns the number of patches kept, moved to the front.
+pub(super) fn measure_photometric(
+    objective: &mut Objective,
+    estimate: &Estimate,
+    in_view: usize,
+    scratch: &mut AlignScratch,
+) -> usize {
+    let views = virtual_views(
+        &estimate.keyframe_from_camera,
+        objective.views,
+        SampleRule::Midpoint,
+        &objective.camera,
+    );
+    // Without a threshold the mean cost of a patch is half its mean square.
+    let square_model = ResidualModel { huber: f32::MAX, ..objective.model };
+    let problem = objective.transfer_problem(estimate, &views);
+    let (sites, costs) = (&mut scratch.sites[..in_view], &mut scratch.costs[..in_view]);
+    transfer::evaluate_cost(objective.simd, &problem, sites, &square_model, costs);
+    let mut count = 0;
+    for cost in costs.iter().filter(|cost| cost.pixels > 0.0) {
+        scratch.medians[count] = mean_cost(cost);
+        count += 1;
+    }
+    let typical = median(&mut scratch.medians[..count]).max(MIN_COST);
+    let mut kept = 0;
+    for k in 0..in_view {
+        if mean_cost(&costs[k]) < objective.settings.outlier_factor * typical {
+            sites[kept] = sites[k];
+            kept += 1;
+        }
+    }
+    // Half the mean square is half the variance.
+    objective.model.read_variance *= 2.0 * typical;
+    objective.model.photon_variance *= 2.0 * typical;
+    kept
+}
+
+/// Least mean cost in nominal variances: a perfect fit must not get infinite weight.
+const MIN_COST: f32 = 1e-3;
+
+fn mean_cost(patch: &PatchCost) -> f32 {
+    if patch.pixels > 0.0 { patch.cost / patch.pixels } else { f32::MAX }
+}
+
+/// Measures the depth noise scale at `estimate`; `None` where too few points overlap. `medians` is scratch.
+pub(super) fn measure_depth<'a>(
+    objective: &Objective<'a>,
+    estimate: &Estimate,
+    stride: usize,
+    medians: &mut [f32],
+) -> Option<DepthPart<'a>> {
+    let camera = objective.depth_camera;
+    let mut problem = DepthProblem {
+        current: objective.frame.depth,
+        keyframe: objective.reference.depth,
+        planes: objective.reference.planes,
+        camera,
+        // A sample of the points is enough for a median.
+        stride: stride * 2,
+        gate: gate_for(f32::MAX),
+    };
+    let (sigma, count) = problem.noise_scale(&estimate.keyframe_from_camera.mid(), medians);
+    if count * stride * stride * 4 < MIN_DEPTH_POINTS * 16 {
+        return None;
+    }
+    let sigma = sigma.max(objective.settings.min_depth_sigma);
+    problem.stride = stride;
+    problem.gate = gate_for(sigma);
+    let area = (stride * stride) as f64;
+    let weight = area / objective.settings.depth_correlation.max(area);
+    Some(DepthPart { problem, sigma, weight })
+}

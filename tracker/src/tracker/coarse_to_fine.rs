@@ -1,0 +1,163 @@
+//! The order in which levels and first guesses are tried.
+
+use arrayvec::ArrayVec;
+use nalgebra::Vector3;
+
+use super::history::Motion;
+use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, MotionPrior};
+use crate::geometry::RigidTransform;
+use crate::trajectory::ExposureTrajectory;
+use crate::transfer::BrightnessModel;
+
+/// Levels on which several first guesses compete.
+const COMPETING_LEVELS: usize = 2;
+
+/// A guess this much worse than what recent frames ended with is not trusted alone.
+const TRUSTED_SCORE_RATIO: f64 = 1.25;
+
+/// Steps below this many pixels of a competing level are left to the finer ones.
+const COMPETING_MIN_STEP: f64 = 0.1;
+
+/// Upper bound of first guesses.
+const MAX_GUESSES: usize = 6;
+
+/// One frame to be aligned with one reference.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FrameTask<'a> {
+    pub(super) alignment: Alignment<'a>,
+    /// Last motion, in the frame of the reference.
+    pub(super) motion: Motion,
+    pub(super) timestamp: f64,
+    pub(super) exposure: f64,
+    /// Angular velocity since the last frame, camera frame, rad/s.
+    pub(super) gyro: Option<Vector3<f64>>,
+    pub(super) brightness: BrightnessModel,
+    /// Whether the motion during the exposure is sampled.
+    pub(super) blur: bool,
+    /// Typical inverse depth of the scene, 1/m.
+    pub(super) inverse_depth: f64,
+    /// Score that recent frames ended the competing levels with; infinite if any is fine.
+    pub(super) trusted_score: f64,
+}
+
+/// A finished alignment.
+#[derive(Clone, Debug)]
+pub(super) struct Aligned {
+    /// Outcome of the finest level, with the direction of time settled.
+    pub(super) outcome: LevelOutcome,
+    /// Linearisations on all levels.
+    pub(super) iterations: usize,
+    /// Score after the competing levels: lower is better.
+    pub(super) score: f64,
+}
+
+impl FrameTask<'_> {
+    /// First guesses of the mid pose, most likely first.
+    pub(super) fn guesses(&self) -> ArrayVec<RigidTransform, MAX_GUESSES> {
+        let dt = self.timestamp - self.motion.timestamp;
+        let steady = self.motion.between_frames;
+        let mut guesses = ArrayVec::new();
+        if let Some(gyro) = self.gyro {
+            let mut rate = steady;
+            rate.fixed_rows_mut::<3>(3).copy_from(&gyro);
+            guesses.push(self.motion.extrapolate(&rate, dt));
+        }
+        guesses.push(self.motion.extrapolate(&steady, dt));
+        if let Some(rate) = self.motion.within_exposure {
+            guesses.push(self.motion.extrapolate(&rate, dt));
+        }
+        guesses.push(self.motion.reference_from_mid);
+        guesses.push(self.motion.extrapolate(&-steady, dt));
+        guesses
+    }
+
+    /// Aligns coarse to fine. The guesses compete on the coarsest levels, one after the other until one ends as
+    /// well as recent frames did; the best goes on alone.
+    pub(super) fn run(&self, guesses: &[RigidTransform], scratch: &mut AlignScratch) -> Aligned {
+        let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
+        let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
+        let mut iterations = 0;
+        let mut best: Option<(f64, LevelOutcome)> = None;
+        for guess in guesses {
+            let mut outcome = LevelOutcome::unchanged(self.estimate_at(guess));
+            for level in (last_competing..=coarsest).rev() {
+                let mid = outcome.estimate.keyframe_from_camera.mid();
+                let start = Estimate { brightness: outcome.estimate.brightness, ..self.estimate_at(&mid) };
+                outcome = self.level(level, start, scratch);
+                iterations += outcome.iterations;
+            }
+            let score = score(&outcome);
+            if best.as_ref().is_none_or(|(best_score, _)| score < *best_score) {
+                best = Some((score, outcome));
+            }
+            if score < TRUSTED_SCORE_RATIO * self.trusted_score {
+                break;
+            }
+        }
+        let (score, mut outcome) = best.unwrap_or_else(|| {
+            (f64::MAX, LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)))
+        });
+        for level in (0..last_competing).rev() {
+            let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
+            outcome = self.level(level, start, scratch);
+            iterations += outcome.iterations;
+        }
+        outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
+        Aligned { outcome, iterations, score }
+    }
+
+    fn level(&self, level: usize, start: Estimate, scratch: &mut AlignScratch) -> LevelOutcome {
+        let competing = level + COMPETING_LEVELS >= self.alignment.reference.levels.len();
+        let plan = LevelPlan {
+            level,
+            depth_stride: if competing { 4 } else { 2 },
+            min_step: if competing { COMPETING_MIN_STEP } else { self.alignment.settings.min_step },
+            max_iterations: self.alignment.settings.max_iterations,
+            blur: self.blur,
+        };
+        self.alignment.align_level(&plan, start, &self.prior(&start), scratch)
+    }
+
+    fn prior(&self, estimate: &Estimate) -> MotionPrior {
+        self.prior_at(&estimate.keyframe_from_camera.mid())
+    }
+
+    fn prior_at(&self, reference_from_mid: &RigidTransform) -> MotionPrior {
+        self.motion.expected_motion(
+            reference_from_mid,
+            self.timestamp,
+            self.exposure,
+            &self.alignment.camera,
+            self.inverse_depth,
+        )
+    }
+
+    /// The estimate with the expected motion around a mid pose.
+    fn estimate_at(&self, reference_from_mid: &RigidTransform) -> Estimate {
+        let expected = self.prior_at(reference_from_mid).expected;
+        Estimate {
+            keyframe_from_camera: ExposureTrajectory::from_mid_and_motion(reference_from_mid, &expected),
+            brightness: self.brightness,
+        }
+    }
+}
+
+/// How badly a guess ended: photometric residual, raised by patches that disagree and by depth that does not fit.
+fn score(outcome: &LevelOutcome) -> f64 {
+    if outcome.patches_in_view == 0 {
+        return f64::MAX;
+    }
+    let disagreeing = 1.0 - outcome.patches as f64 / outcome.patches_in_view as f64;
+    let depth = 1.0 + 100.0 * f64::from(outcome.depth_scale);
+    f64::from(outcome.photometric_scale) * (1.0 + disagreeing) * depth
+}
+
+/// The estimate or its reverse, whichever moves in the expected direction: a blurred image alone cannot tell.
+fn oriented(estimate: Estimate, prior: &MotionPrior) -> Estimate {
+    let towards = prior.information.component_mul(&prior.expected);
+    if estimate.keyframe_from_camera.motion().dot(&towards) < 0.0 {
+        Estimate { keyframe_from_camera: estimate.keyframe_from_camera.reversed(), ..estimate }
+    } else {
+        estimate
+    }
+}

@@ -2,6 +2,7 @@
 
 pub mod dataset;
 mod error;
+pub mod synth;
 mod text_lines;
 pub mod trajectory_file;
 

@@ -4,6 +4,7 @@ pub mod dataset;
 mod error;
 pub mod evaluation;
 pub mod run;
+pub mod synth;
 mod text_lines;
 pub mod tracking;
 pub mod trajectory_file;

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::io;
 
+use mba_mapper::FileError;
 use mba_mapper::run::RunError;
 
 /// Exit code of wrong use or bad input.
@@ -81,15 +82,21 @@ fn hint(error: &anyhow::Error) -> Option<&str> {
     if let Some(bad) = error.downcast_ref::<BadInput>() {
         return (!bad.hint.is_empty()).then_some(&bad.hint);
     }
-    is_disk_full(error).then_some("make room and start again; what had been finished before is still there")
+    error
+        .chain()
+        .any(is_disk_full)
+        .then_some("make room and start again; what had been finished before is still there")
 }
 
-fn is_disk_full(error: &anyhow::Error) -> bool {
-    error.chain().any(|cause| {
-        let io = cause.downcast_ref::<io::Error>().map(io::Error::kind);
-        matches!(cause.downcast_ref(), Some(RunError::DiskFull { .. }))
-            || io == Some(io::ErrorKind::StorageFull)
-    })
+/// Whether an error, leaving its causes aside, says that nothing more fits on the disk.
+#[must_use]
+pub fn is_disk_full(error: &(dyn Error + 'static)) -> bool {
+    let reason = match error.downcast_ref() {
+        Some(FileError::Unwritable { reason, .. }) => Some(reason),
+        _ => error.downcast_ref::<io::Error>(),
+    };
+    matches!(error.downcast_ref(), Some(RunError::DiskFull { .. }))
+        || reason.is_some_and(|reason| reason.kind() == io::ErrorKind::StorageFull)
 }
 
 #[cfg(test)]

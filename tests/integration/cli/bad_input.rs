@@ -141,6 +141,27 @@ fn an_output_that_cannot_be_created_is_refused_before_the_work() {
     let place = Workplace::new();
     fs::write(place.path("run"), "a file").unwrap();
     place.track().assert_error(2, &["cannot write", "run"]);
+    let below_a_file = place.path("run/data");
+    mba([Path::new("synth"), Path::new("--size"), Path::new("64x48"), Path::new("--out"), &below_a_file])
+        .assert_error(2, &["cannot write", "run/data"]);
+}
+
+#[test]
+fn settings_out_of_range_are_refused() {
+    let place = Workplace::new();
+    let synth = |option: &str, value: &str| {
+        let out = place.path("out");
+        mba(["synth".as_ref(), "--out".as_ref(), out.as_os_str(), option.as_ref(), value.as_ref()])
+    };
+    synth("--exposure", "2").assert_error(2, &["exposure is 2", "frame interval"]);
+    synth("--frames", "0").assert_error(2, &["frames is 0"]);
+    for (option, value) in [("--size", "640"), ("--blur", "-1"), ("--scene", "moon"), ("--response", "cubic")]
+    {
+        let outcome = synth(option, value);
+        assert_eq!(outcome.code, Some(2));
+        assert!(outcome.stderr.contains(value), "{}", outcome.stderr);
+    }
+    assert!(!place.path("out").exists(), "nothing is written before the settings are known to be good");
 }
 
 #[cfg(target_os = "linux")]

@@ -1,5 +1,6 @@
 //! What works.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
 
@@ -92,6 +93,40 @@ fn a_tracked_run_can_be_evaluated_and_reported() {
         assert!(!page.contains(outside), "the report asks for another file: {outside}");
     }
     assert!(run.join("plots/trajectory_top.svg").is_file());
+}
+
+#[test]
+fn synth_writes_a_data_set_that_info_understands() {
+    let place = Workplace::new();
+    let synth = |name: &str, threads: &str| {
+        let out = place.path(name);
+        let options = [
+            "--frames",
+            "2",
+            "--size",
+            "64x48",
+            "--blur",
+            "3",
+            "--scene",
+            "wall",
+            "--json",
+            "--threads",
+            threads,
+        ];
+        let fixed = ["synth", "--out"].map(OsStr::new).into_iter().chain([out.as_os_str()]);
+        mba(fixed.chain(options.map(OsStr::new)))
+    };
+    let written = synth("one", "1").json();
+    assert_eq!(written["frames"], 2);
+    let info = mba([Path::new("info"), &place.path("one"), Path::new("--json")]).json();
+    assert_eq!((&info["frames"], &info["width"], &info["response"]), (&2.into(), &64.into(), &"srgb".into()));
+    assert_eq!(info["ground_truth_exposures"], 2);
+    assert_eq!(synth("two", "2").code, Some(0));
+    for file in ["rgb/000001.png", "depth/000001.png", "groundtruth_exposure.txt"] {
+        let [one, two] = ["one", "two"].map(|folder| fs::read(place.path(folder).join(file)).unwrap());
+        assert!(one == two, "{file} depends on the number of threads");
+    }
+    synth("one", "1").assert_error(2, &["one is not empty"]);
 }
 
 #[test]

@@ -1,4 +1,5 @@
 //! Helpers shared by the whole-system tests.
 
 pub mod reference_values;
+pub mod small_dataset;
 pub mod transfer_scene;

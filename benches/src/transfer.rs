@@ -1,9 +1,10 @@
 //! A transfer problem at 640x480: wavy texture, an exposure of a shaking hand, patches all over the image.
 
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use mba_tracker::image::LevelImage;
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use mba_tracker::transfer::{
-    BrightnessModel, LevelImage, PatchSite, ResidualModel, TransferProblem, VirtualView, virtual_views,
+    BrightnessModel, PatchSite, ResidualModel, TransferProblem, VirtualView, virtual_views,
 };
 use nalgebra::Vector6;
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
+use mba_mapper::synth::{DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
@@ -42,6 +43,10 @@ pub struct Global {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Render a blurred sequence, track it, and show how well that went; needs no input
+    Demo(Demo),
+    /// Render a synthetic, motion-blurred RGB-D data set with exact ground truth
+    Synth(Synth),
     /// Show what a data set holds, lacks and what is odd about it
     Info(Info),
     /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
@@ -51,6 +56,117 @@ pub enum Command {
     /// Measure an estimate against a reference
     #[command(subcommand)]
     Eval(EvalCommand),
+}
+
+/// Arguments of `mba demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The folder gets the sequence (kept for the next time), the RUN folder, charts and report.html.
+
+Example:
+  mba demo --quick")]
+pub struct Demo {
+    /// Folder for everything that is written
+    #[arg(long, value_name = "DIR", default_value = "mba-demo")]
+    pub out: PathBuf,
+    /// Fewer and smaller frames
+    #[arg(long)]
+    pub quick: bool,
+}
+
+/// Arguments of `mba synth`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+The data set has rgb/, depth/, sharp/, lists, calibration.toml, groundtruth.txt and \
+groundtruth_exposure.txt (poses at opening, middle and closing of the shutter). Equal options give equal \
+files.
+
+Examples:
+  mba synth --out data
+  mba synth --out hard --scene hall --blur 24 --exposure 0.028 --frames 60 --seed 7
+  mba synth --out clean --response linear --noise off --depth exact")]
+pub struct Synth {
+    /// New or empty folder for the data set
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// What the camera sees: room, hall or wall
+    #[arg(long, value_name = "NAME", default_value_t = SynthConfig::default().scene)]
+    pub scene: SceneName,
+    /// Number of frames
+    #[arg(long, value_name = "N", default_value_t = SynthConfig::default().frames)]
+    pub frames: usize,
+    /// Width and height of the images in pixels
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    pub size: (usize, usize),
+    /// Mean blur length in pixels; 0 holds the camera still
+    #[arg(long, value_name = "PX", default_value_t = 10.0, value_parser = non_negative)]
+    pub blur: f64,
+    /// Time the shutter is open, in seconds
+    #[arg(long, value_name = "S", default_value_t = SynthConfig::default().exposure_seconds)]
+    pub exposure: f64,
+    /// Frames per second
+    #[arg(long, value_name = "HZ", default_value_t = SynthConfig::default().frame_rate)]
+    pub frame_rate: f64,
+    /// How light becomes 8-bit values
+    #[arg(long, value_enum, default_value_t)]
+    pub response: ResponseName,
+    /// Photon and read noise of the colour images
+    #[arg(long, value_enum, default_value_t)]
+    pub noise: Switch,
+    /// Depth as a structured-light sensor sees it, or exact
+    #[arg(long, value_enum, default_value_t)]
+    pub depth: DepthName,
+    /// Seed of hand shake and noise
+    #[arg(long, value_name = "N", default_value_t = SynthConfig::default().seed)]
+    pub seed: u64,
+}
+
+impl Synth {
+    /// The settings of the generator.
+    #[must_use]
+    pub fn config(&self) -> SynthConfig {
+        let defaults = SynthConfig::default();
+        SynthConfig {
+            scene: self.scene,
+            frames: self.frames,
+            width: self.size.0,
+            height: self.size.1,
+            frame_rate: self.frame_rate,
+            exposure_seconds: self.exposure,
+            mean_blur_px: self.blur,
+            noise: (self.noise == Switch::On).then(NoiseModel::default),
+            depth: match self.depth {
+                DepthName::Sensor => DepthSensor::StructuredLight,
+                DepthName::Exact => DepthSensor::Exact,
+            },
+            response: match self.response {
+                ResponseName::Srgb => ResponseCurve::Srgb,
+                ResponseName::Linear => ResponseCurve::Linear,
+            },
+            seed: self.seed,
+            ..defaults
+        }
+    }
+}
+
+/// Values of `--response`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ResponseName {
+    /// The sRGB transfer function
+    #[default]
+    Srgb,
+    /// Proportional to light
+    Linear,
+}
+
+/// Values of `--depth`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum DepthName {
+    /// Noise, steps and holes of a structured-light sensor
+    #[default]
+    Sensor,
+    /// Exact and without holes
+    Exact,
 }
 
 /// Arguments of `mba info`.
@@ -237,4 +353,10 @@ fn virtual_views(text: &str) -> Result<usize, String> {
         Ok(views) if (1..=MAX_VIRTUAL_VIEWS).contains(&views) => Ok(views),
         _ => Err(format!("a number from 1 to {MAX_VIRTUAL_VIEWS} is needed")),
     }
+}
+
+/// Two numbers with an x between them.
+fn size(text: &str) -> Result<(usize, usize), String> {
+    let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    parsed.ok_or_else(|| "a size such as 640x480 is needed".to_owned())
 }

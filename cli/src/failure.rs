@@ -2,6 +2,10 @@
 
 use std::error::Error;
 use std::fmt;
+use std::io;
+
+use mba_mapper::FileError;
+use mba_mapper::run::RunError;
 
 /// Exit code of wrong use or bad input.
 pub const BAD_INPUT: u8 = 2;
@@ -68,10 +72,31 @@ pub fn message(error: &anyhow::Error) -> String {
             last = cause;
         }
     }
-    match error.downcast_ref::<BadInput>() {
-        Some(bad) if !bad.hint.is_empty() => format!("{text}\nhint: {}", bad.hint),
-        _ => text,
+    match hint(error) {
+        Some(hint) => format!("{text}\nhint: {hint}"),
+        None => text,
     }
+}
+
+fn hint(error: &anyhow::Error) -> Option<&str> {
+    if let Some(bad) = error.downcast_ref::<BadInput>() {
+        return (!bad.hint.is_empty()).then_some(&bad.hint);
+    }
+    error
+        .chain()
+        .any(is_disk_full)
+        .then_some("make room and start again; what had been finished before is still there")
+}
+
+/// Whether an error, leaving its causes aside, says that nothing more fits on the disk.
+#[must_use]
+pub fn is_disk_full(error: &(dyn Error + 'static)) -> bool {
+    let reason = match error.downcast_ref() {
+        Some(FileError::Unwritable { reason, .. }) => Some(reason),
+        _ => error.downcast_ref::<io::Error>(),
+    };
+    matches!(error.downcast_ref(), Some(RunError::DiskFull { .. }))
+        || reason.is_some_and(|reason| reason.kind() == io::ErrorKind::StorageFull)
 }
 
 #[cfg(test)]

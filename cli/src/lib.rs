@@ -49,6 +49,8 @@ pub fn run(cli: &Cli) -> anyhow::Result<()> {
 
 fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
     match command {
+        Command::Demo(args) => commands::demo::run(args, console),
+        Command::Synth(args) => commands::synth::run(args, console),
         Command::Info(args) => commands::info::run(args, console),
         Command::Track(args) => commands::track::run(args, console),
         Command::Report(args) => commands::report::run(args, console),

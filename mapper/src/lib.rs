@@ -8,5 +8,6 @@ pub mod synth;
 mod text_lines;
 pub mod tracking;
 pub mod trajectory_file;
+mod whole_file;
 
 pub use error::FileError;

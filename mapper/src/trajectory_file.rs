@@ -4,7 +4,6 @@
 //! starting with `#` are comments.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use mba_tracker::geometry::RigidTransform;
@@ -12,6 +11,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
+use crate::whole_file::write_whole;
 
 /// How far the length of a quaternion in a file may be from 1; what is accepted is normalised.
 ///
@@ -78,13 +78,18 @@ pub fn read_exposures(path: &Path) -> Result<Vec<TimedExposure>, FileError> {
 ///
 /// [`FileError::Unwritable`].
 pub fn write_trajectory(path: &Path, poses: &[TimedPose]) -> Result<(), FileError> {
+    write_whole(path, &format_trajectory(poses))
+}
+
+/// The text of [`write_trajectory`].
+pub(crate) fn format_trajectory(poses: &[TimedPose]) -> String {
     let mut text = String::from("# timestamp tx ty tz qx qy qz qw (camera-to-world at mid exposure)\n");
     for pose in poses {
         push_timestamp(&mut text, pose.timestamp);
         push_pose(&mut text, &pose.world_from_camera);
         text.push('\n');
     }
-    write_whole(path, &text)
+    text
 }
 
 /// Writes exposure lines in the format of [`read_exposures`]; precision and atomicity as [`write_trajectory`].
@@ -93,6 +98,11 @@ pub fn write_trajectory(path: &Path, poses: &[TimedPose]) -> Result<(), FileErro
 ///
 /// [`FileError::Unwritable`].
 pub fn write_exposures(path: &Path, exposures: &[TimedExposure]) -> Result<(), FileError> {
+    write_whole(path, &format_exposures(exposures))
+}
+
+/// The text of [`write_exposures`].
+pub(crate) fn format_exposures(exposures: &[TimedExposure]) -> String {
     let mut text = String::from(
         "# timestamp, then tx ty tz qx qy qz qw at exposure start, mid, end (camera-to-world)\n",
     );
@@ -103,7 +113,7 @@ pub fn write_exposures(path: &Path, exposures: &[TimedExposure]) -> Result<(), F
         }
         text.push('\n');
     }
-    write_whole(path, &text)
+    text
 }
 
 /// Parses every line into `N` numbers and a value; the first number is the timestamp.
@@ -146,18 +156,10 @@ fn push_pose(text: &mut String, pose: &RigidTransform) {
     }
 }
 
-/// Writes beside the file and renames, so that a full disk never leaves half a file.
-pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {
-    let partial = path.with_added_extension("partial");
-    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|reason| {
-        // Only a left-over is lost if this fails too.
-        let _ = fs::remove_file(&partial);
-        FileError::Unwritable { path: path.to_owned(), reason }
-    })
-}
-
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn message(text: &str) -> String {

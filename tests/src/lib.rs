@@ -3,4 +3,5 @@
 pub mod handheld;
 pub mod plane_scene;
 pub mod reference_values;
+pub mod small_dataset;
 pub mod transfer_scene;

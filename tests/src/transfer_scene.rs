@@ -1,9 +1,10 @@
 //! Random transfer problems: images, camera, exposure, patch sites and brightness drawn from a seed.
 
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use mba_tracker::image::LevelImage;
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use mba_tracker::transfer::{
-    BrightnessModel, LevelImage, PatchSite, ResidualModel, TransferProblem, VirtualView, virtual_views,
+    BrightnessModel, PatchSite, ResidualModel, TransferProblem, VirtualView, virtual_views,
 };
 use nalgebra::Vector6;
 use rand_core::Rng;

@@ -13,6 +13,46 @@
 //!   multiplied on the right (camera frame), radians.
 //! * Intensities are linear light in `[0, 1]`. Depth is z along the optical axis in metres, not distance.
 //! * Exposure time is normalised: `s = 0` at shutter opening, `s = 1` at closing.
+//!
+//! # Layers
+//!
+//! A module uses only those to its left: [`math`], [`geometry`], [`trajectory`], [`photometric`], [`image`],
+//! [`surface`], [`transfer`], [`keyframe`], [`deblur`], [`align`], [`Tracker`].
+//!
+//! # Use
+//!
+//! ```
+//! use mba_tracker::geometry::PinholeCamera;
+//! use mba_tracker::image::{ColourView, DepthView, PixelFormat};
+//! use mba_tracker::photometric::InverseResponse;
+//! use mba_tracker::{Frame, SimdLevel, Tracker, TrackerConfig};
+//!
+//! let camera = PinholeCamera { width: 160, height: 120, fx: 125.0, fy: 125.0, cx: 79.5, cy: 59.5 };
+//! let config = TrackerConfig::new(camera, 1.0 / 5000.0, InverseResponse::srgb());
+//! let mut memory = vec![0; config.workspace_len()]; // or a static array: the length is a const fn
+//! let mut tracker = Tracker::new(&config, SimdLevel::baseline(), &mut memory)?;
+//!
+//! # let (grey, depth) = (vec![128u8; 160 * 120], vec![10_000u16; 160 * 120]);
+//! let result = tracker.track(&Frame {
+//!     timestamp: 0.0,
+//!     exposure: 0.016,
+//!     colour: ColourView::new(&grey, 160, 120, 160, PixelFormat::Grey8)?,
+//!     depth: DepthView::new(&depth, 160, 120, 160)?,
+//!     angular_velocity: None,
+//! })?;
+//! println!("{:?}: opened at {:?}", result.status, result.world_from_camera.start);
+//! # Ok::<(), Box<dyn core::error::Error>>(())
+//! ```
+//!
+//! # Memory
+//!
+//! The caller owns all of it: [`TrackerConfig::workspace_len`] bytes, handed over once. The crate has no allocator
+//! to call, so nothing can be allocated later.
+//!
+//! # Features
+//!
+//! * `std` (default): `SimdLevel::new()` asks the operating system for the best instruction set. Without it,
+//!   `SimdLevel::baseline()` takes what the target was compiled for.
 #![no_std]
 #![deny(unsafe_code)]
 

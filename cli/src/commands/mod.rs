@@ -1,7 +1,9 @@
 //! One file per command.
 
+pub mod demo;
 pub mod eval_trajectory;
 pub mod info;
 pub mod open;
 pub mod report;
+pub mod synth;
 pub mod track;

@@ -186,7 +186,7 @@ impl Ranged for Axis {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        let step = self.step(hint.max_num_points());
+        let step = self.label_distance(hint.max_num_points());
         let first = (self.0.start / step).ceil() as i64;
         let last = (self.0.end / step).floor() as i64;
         (first..=last).map(|k| k as f64 * step).collect()
@@ -199,7 +199,7 @@ impl Ranged for Axis {
 
 impl Axis {
     /// The smallest of 1, 2, 5 times a power of ten that gives at most `count` labels.
-    fn step(&self, count: usize) -> f64 {
+    fn label_distance(&self, count: usize) -> f64 {
         let rough = (self.0.end - self.0.start) / count.clamp(2, 8) as f64;
         let power = 10f64.powf(rough.log10().floor());
         [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|step| *step >= rough).unwrap_or(rough)
@@ -209,7 +209,7 @@ impl Axis {
 impl ValueFormatter<f64> for Axis {
     fn format_ext(&self, value: &f64) -> String {
         // A label at zero must not show the sign of a rounding error.
-        let decimals = (-self.step(8).log10().floor()).clamp(0.0, 9.0) as usize;
+        let decimals = (-self.label_distance(8).log10().floor()).clamp(0.0, 9.0) as usize;
         format!("{:.decimals$}", value + 0.0)
     }
 }
@@ -249,7 +249,7 @@ mod tests {
     #[test]
     fn labels_are_round_numbers() {
         let axis = Axis(-0.013..0.061);
-        assert_eq!(axis.step(8), 0.01);
+        assert_eq!(axis.label_distance(8), 0.01);
         assert_eq!(axis.format_ext(&0.02), "0.02");
         assert_eq!(axis.format_ext(&-0.0), "0.00");
     }

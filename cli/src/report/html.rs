@@ -18,6 +18,7 @@ pub(super) fn page(run: &Run, plots: &[Plot]) -> String {
         plots.iter().map(|plot| format!("<figure>{}</figure>\n", inline(&plot.svg))).collect();
     let tables = [
         frames_table(summary),
+        spread_table(summary),
         summary.trajectory.as_ref().map(trajectory_table).unwrap_or_default(),
         summary.blur.as_ref().map(blur_table).unwrap_or_default(),
         settings_table(summary),
@@ -106,7 +107,7 @@ fn grade(value: f64, good: f64, doubtful: f64) -> &'static str {
 
 fn frames_table(summary: &Summary) -> String {
     let counts = &summary.frames;
-    let mut rows = vec![
+    let rows = [
         ["frames".to_owned(), counts.total.to_string()],
         ["tracked".to_owned(), counts.ok.to_string()],
         ["tracked, doubtful".to_owned(), counts.weak.to_string()],
@@ -114,40 +115,31 @@ fn frames_table(summary: &Summary) -> String {
         ["skipped (unreadable image)".to_owned(), counts.skipped.to_string()],
         ["keyframes".to_owned(), counts.keyframes.to_string()],
     ];
-    for (name, unit, spread) in
-        [("time per frame", "ms", &summary.milliseconds), ("blur length", "px", &summary.blur_px)]
-    {
-        let Some(Spread { mean, median, p95, p99, max }) = spread else { continue };
-        for (label, value) in [("mean", mean), ("median", median), ("p95", p95), ("p99", p99), ("max", max)] {
-            rows.push([format!("{name}, {label}"), format!("{value:.2} {unit}")]);
-        }
-    }
     card("Frames", &rows)
+}
+
+/// Time and blur per frame: where the bulk and where the tail lies.
+fn spread_table(summary: &Summary) -> String {
+    let row = |(label, spread): (&str, &Spread)| {
+        let Spread { mean, median, p95, p99, max } = spread;
+        number_row(label, &[mean, median, p95, p99, max].map(|v| format!("{v:.1}")))
+    };
+    let spreads = [("time [ms]", &summary.milliseconds), ("blur [px]", &summary.blur_px)];
+    let rows: String = spreads.into_iter().filter_map(|(l, s)| Some(row((l, s.as_ref()?)))).collect();
+    number_table("Per frame", &["mean", "median", "p95", "p99", "max"], &rows, "")
 }
 
 fn trajectory_table(figures: &TrajectoryFigures) -> String {
     let row = |label: &str, s: &Statistics, scale: f64| {
-        [s.rmse, s.mean, s.median, s.max]
-            .map(|v| format!("{:.3}", scale * v))
-            .into_iter()
-            .fold(format!("<tr><th>{label}</th>"), |row, cell| {
-                row + &format!("<td class=\"number\">{cell}</td>")
-            })
-            + "</tr>\n"
+        number_row(label, &[s.rmse, s.mean, s.median, s.max].map(|v| format!("{:.3}", scale * v)))
     };
-    let head = "<thead><tr><th></th><th class=\"number\">rmse</th><th class=\"number\">mean</th>\
-                <th class=\"number\">median</th><th class=\"number\">max</th></tr></thead>";
     let rows = [
         row("error [cm]", &figures.ate_m, 100.0),
         row("step error [cm]", &figures.rpe_translation_m, 100.0),
         row("step error [deg]", &figures.rpe_rotation_deg, 1.0),
     ];
-    format!(
-        "<div class=\"card\"><h2>Trajectory</h2><table>{head}<tbody>\n{}</tbody></table>\
-         <p>{} poses compared after alignment of rotation and translation.</p></div>\n",
-        rows.concat(),
-        figures.matches
-    )
+    let note = format!("{} poses compared after alignment by rotation and translation.", figures.matches);
+    number_table("Trajectory", &["rmse", "mean", "median", "max"], &rows.concat(), &note)
 }
 
 fn blur_table(figures: &BlurFigures) -> String {
@@ -172,6 +164,19 @@ fn settings_table(summary: &Summary) -> String {
         rows.push([name.replace('_', " "), text]);
     }
     card("Settings", &rows)
+}
+
+fn number_row(label: &str, numbers: &[String]) -> String {
+    let cells: String = numbers.iter().map(|n| format!("<td class=\"number\">{n}</td>")).collect();
+    format!("<tr><th>{label}</th>{cells}</tr>\n")
+}
+
+fn number_table(title: &str, columns: &[&str], rows: &str, note: &str) -> String {
+    let head: String = columns.iter().map(|c| format!("<th class=\"number\">{c}</th>")).collect();
+    format!(
+        "<div class=\"card\"><h2>{title}</h2><table><thead><tr><th></th>{head}</tr></thead><tbody>\n\
+         {rows}</tbody></table><p>{note}</p></div>\n"
+    )
 }
 
 fn card(title: &str, rows: &[[String; 2]]) -> String {

@@ -1,12 +1,14 @@
 //! Writing a RUN folder while the run goes on.
 
 use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::merit::mid_pose;
 use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
 use super::{FrameRecord, RunError, RunSettings, Summary, frame_record};
-use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory, write_whole};
+use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
+use crate::whole_file::write_together;
 
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
 const FRAMES_PER_FLUSH: usize = 50;
@@ -117,14 +119,17 @@ impl RunWriter {
 
     fn write(&self, summary: &Summary) -> Result<(), RunError> {
         let poses: Vec<TimedPose> = self.exposures.iter().map(mid_pose).collect();
-        write_trajectory(&self.folder.join(TRAJECTORY_FILE), &poses).map_err(RunError::from_write)?;
-        write_exposures(&self.folder.join(EXPOSURES_FILE), &self.exposures).map_err(RunError::from_write)?;
-        let frames = frame_record::format_frames(&self.frames);
-        write_whole(&self.folder.join(FRAMES_FILE), &frames).map_err(RunError::from_write)?;
-        let path = self.folder.join(SUMMARY_FILE);
-        let json = serde_json::to_string_pretty(summary)
-            .map_err(|error| RunError::unwritable(&path, std::io::Error::other(error)))?;
-        write_whole(&path, &(json + "\n")).map_err(RunError::from_write)
+        let json = serde_json::to_string_pretty(summary).map_err(|error| {
+            RunError::unwritable(&self.folder.join(SUMMARY_FILE), io::Error::other(error))
+        })?;
+        let file = |name: &str, text: String| (self.folder.join(name), text);
+        write_together(&[
+            file(TRAJECTORY_FILE, format_trajectory(&poses)),
+            file(EXPOSURES_FILE, format_exposures(&self.exposures)),
+            file(FRAMES_FILE, frame_record::format_frames(&self.frames)),
+            file(SUMMARY_FILE, json + "\n"),
+        ])
+        .map_err(RunError::from_write)
     }
 }
 
@@ -257,6 +262,7 @@ mod tests {
         push(&mut writer, 1, FrameStatus::Ok);
         let error = writer.flush().unwrap_err();
         assert!(matches!(error, RunError::DiskFull { ref path } if path.ends_with("frames.csv")), "{error}");
-        assert_eq!(Run::open(folder.path()).unwrap().frames.len(), 1);
+        let run = Run::open(folder.path()).unwrap();
+        assert_eq!((run.frames.len(), run.exposures.len(), run.summary.frames.total), (1, 1, 1));
     }
 }

@@ -10,7 +10,7 @@ use super::render::DepthSample;
 pub(super) const UNITS_PER_METRE: f32 = 5000.0;
 
 /// Standard deviation of the measured inverse depth, 1/m: that of depth is this times depth squared, metres
-/// (Khoshelham and Elberink 2012 measured 0.0014 to 0.0028 on Kinect cameras).
+/// (the quadratic coefficient that Nguyen, Izadi and Lovell 2012 measured for the Kinect).
 pub(super) const INVERSE_DEPTH_SIGMA: f32 = 0.0019;
 
 /// Pixels over which the error is correlated: the matching window of the sensor.

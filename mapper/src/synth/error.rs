@@ -28,7 +28,7 @@ pub enum SynthError {
     /// Even the strongest hand shake moves the image too little while the shutter is open.
     #[error(
         "mean blur of {requested} px cannot be reached with an exposure of {exposure_seconds} s, at most \
-         {reachable:.1} px; use a longer exposure"
+         {reachable:.1} px; ask for less blur or a longer exposure"
     )]
     BlurOutOfReach {
         /// Mean blur asked for, pixels.

@@ -2,15 +2,15 @@
 //!
 //! A ray caster films analytic scenes with a camera that sweeps slowly and shakes. Each frame is the mean, in
 //! linear light, of many views within the exposure, so its blur is that of the true motion, which is smooth but
-//! not linear. Then come gain, noise, response and rounding. Equal settings give equal sequences bit for bit, for
-//! any number of threads.
+//! not linear. Then come gain, noise, response and rounding. On one machine equal settings give equal sequences
+//! bit for bit, for any number of threads.
 //!
 //! World y is up; camera x is right, y down, z forward; poses are `world_from_camera`; metres and seconds.
 //!
 //! ```
 //! use mba_mapper::synth::{SynthConfig, SynthSequence};
 //!
-//! let config = SynthConfig { frames: 2, width: 64, height: 48, ..SynthConfig::default() };
+//! let config = SynthConfig { frames: 2, width: 64, height: 48, mean_blur_px: 1.0, ..SynthConfig::default() };
 //! let sequence = SynthSequence::new(config)?;
 //! let frame = sequence.render_frame(1);
 //! assert_eq!(frame.rgb.len(), 3 * 64 * 48);
@@ -29,6 +29,8 @@ mod random;
 mod render;
 mod scene;
 mod sequence;
+#[cfg(test)]
+mod sequence_tests;
 mod view;
 mod writer;
 

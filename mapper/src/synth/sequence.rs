@@ -1,6 +1,5 @@
 //! A synthetic sequence in memory.
 
-use glam::Vec3;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::trajectory::ExposureTrajectory;
 
@@ -167,13 +166,6 @@ impl SynthSequence {
         let rays = TURNED_GRID.map(|offset| SubFrame { view, offset });
         let radiance = render::radiance(&self.scene, self.size(), &rays);
         Developer { noise: None, ..self.developer() }.develop(&radiance, self.camera.width, 0)
-    }
-
-    /// Linear light of the blurred frame `index` before gain, noise and response, from `count` sub-frames, at
-    /// least 1.
-    #[cfg(test)]
-    fn blurred_light(&self, index: usize, count: usize) -> Vec<Vec3> {
-        render::radiance(&self.scene, self.size(), &self.sub_frames(index, count))
     }
 
     fn render_depth(&self, index: usize) -> Vec<u16> {

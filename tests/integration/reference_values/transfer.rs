@@ -1,11 +1,12 @@
 //! Pixel transfer, reblurred intensities and the robust weight.
 
 use mba_tests::reference_values::{ReferenceVector, group, image_waves};
+use mba_tracker::image::LevelImage;
 use mba_tracker::simd::{Level, level_name, levels_up_to};
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule, left_from_right};
 use mba_tracker::transfer::{
-    BrightnessModel, LevelImage, PATTERN_DU, PATTERN_DV, PatchRows, PatchSite, TransferProblem, VirtualView,
-    huber, transfer_pixel, transfer_rows,
+    BrightnessModel, PATTERN_DU, PATTERN_DV, PatchRows, PatchSite, TransferProblem, VirtualView, huber,
+    transfer_pixel, transfer_rows,
 };
 use nalgebra::{Matrix1x6, RowSVector, SMatrix};
 

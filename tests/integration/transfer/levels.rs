@@ -1,13 +1,15 @@
 //! Every instruction set the CPU offers against the scalar oracle, on random problems.
 
 use mba_tests::transfer_scene::TransferScene;
+use mba_tracker::geometry::{RigidTransform, so3};
 use mba_tracker::simd::{Level, level_name, levels_up_to};
-use mba_tracker::trajectory::SampleRule;
+use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use mba_tracker::transfer::{
     PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PatchCost, PatchRows, PatchSite, PatchValues, PhotometricSums,
     ROW_LENGTH, VirtualView, accumulate_rows, evaluate_cost, linearize, reference, transfer_pixel,
     transfer_rows, transfer_values,
 };
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// f32 places a sample within about 1.3e-4 px; gradients here stay below 0.15 per px. Rounding of the
 /// interpolation itself is below 1e-6.
@@ -223,6 +225,45 @@ fn check_sums_stay_finite(level: Level, scene: &TransferScene, views: &[VirtualV
     let want = reference::linearize(&problem, &scene.sites, &model, &mut patches);
     assert!((sums.pixels - want.pixels).abs() <= 4.0, "{} pixels instead of {}", sums.pixels, want.pixels);
     assert!(evaluate_cost(level, &problem, &scene.sites, &model, &mut patches).cost.is_finite());
+    let mut values = vec![PatchValues::default(); scene.sites.len()];
+    transfer_values(level, &problem, &scene.sites, &mut values);
+    assert!(values.iter().flat_map(|values| values.mean).all(f32::is_finite));
+    let mut rows = vec![PatchRows::default(); scene.sites.len()];
+    transfer_rows(level, &problem, &scene.sites, &mut rows);
+    assert!(
+        rows.iter()
+            .flat_map(|rows| rows.pose.iter().chain([&rows.values.mean]))
+            .flatten()
+            .all(|x| x.is_finite())
+    );
+}
+
+/// Both would be transferred to finite, mirrored places inside of the image if nothing else were tested.
+#[test]
+fn pixels_that_look_away_or_stand_behind_the_plane_are_invalid() {
+    let scene = TransferScene::random(1, 60, 1);
+    let turned =
+        RigidTransform::new(so3::exp(&Vector3::new(0.0, core::f64::consts::PI, 0.0)), Vector3::zeros());
+    let retreated = RigidTransform::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, -4.0));
+    let advanced = RigidTransform::new(UnitQuaternion::identity(), Vector3::new(0.0, 0.0, 8.0));
+    let turned_and_advanced = advanced.compose(&turned);
+    let mut behind = scene.sites.clone();
+    behind.iter_mut().for_each(|site| site.inverse_depth = -site.inverse_depth);
+    let cases = [
+        (turned, &scene.sites),
+        (advanced, &scene.sites),
+        (turned_and_advanced, &scene.sites),
+        (retreated, &behind),
+    ];
+    for level in levels_up_to(Level::new()) {
+        for (reference_from_camera, sites) in &cases {
+            let exposure = ExposureTrajectory::still(*reference_from_camera);
+            let views = [VirtualView::new(&exposure, 0.5, &scene.camera)];
+            let mut got = vec![PatchValues::default(); sites.len()];
+            transfer_values(level, &scene.problem_with(&views), sites, &mut got);
+            assert!(got.iter().all(|values| *values == PatchValues::default()), "{reference_from_camera:?}");
+        }
+    }
 }
 
 fn copy_of(scene: &TransferScene) -> TransferScene {

@@ -79,12 +79,11 @@ impl DepthBatch {
         let total = |lanes: f32x8<S>| f64::from(lanes.as_slice().iter().sum::<f32>());
         sums.cost += total(cost);
         sums.points += self.len as f64;
-        let mut entry = 0;
-        for i in 0..6 {
-            sums.gradient[i] += total(gradient[i]);
-            for j in i..6 {
-                sums.hessian[(i, j)] += total(hessian[entry]);
-                entry += 1;
+        let mut entries = hessian.into_iter();
+        for (i, lanes) in gradient.into_iter().enumerate() {
+            sums.gradient[i] += total(lanes);
+            for (j, entry) in (i..6).zip(&mut entries) {
+                sums.hessian[(i, j)] += total(entry);
             }
         }
         self.len = 0;

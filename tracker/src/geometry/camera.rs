@@ -20,8 +20,8 @@ pub struct PinholeCamera {
 }
 
 impl PinholeCamera {
-    /// The camera of pyramid level `level`, where each level averages 2x2 pixels of the one below
-    /// (`equations.md` section 10). Odd rows and columns at the end are dropped.
+    /// The camera of pyramid level `level`, where each level averages 2x2 pixels of the one below,
+    /// which puts the centre of coarse pixel u at fine coordinate 2u + 1/2. Odd rows and columns at the end are dropped.
     #[must_use]
     pub fn at_level(&self, level: usize) -> Self {
         let scale = (1u64 << level) as f64;

@@ -1,4 +1,4 @@
-//! Exponential map, logarithm and Jacobians of SO(3) without special cases (`equations.md` section 2).
+//! Exponential map, logarithm and Jacobians of SO(3) without special cases.
 //!
 //! Rotation vectors are in radians. The helper functions are even and smooth, so no formula here needs a
 //! branch at zero rotation; the branches inside the helpers only choose a numerically stable evaluation.

@@ -4,7 +4,7 @@ mod pyramid;
 mod undistort;
 mod view;
 
-pub use pyramid::{GreyLevel, GreyPyramid, MAX_LEVELS};
+pub use pyramid::{GreyLevel, GreyPyramid, LevelImage, MAX_LEVELS};
 pub use undistort::{
     BufferSizeError, NO_SOURCE, PixelRectangle, SourcePosition, fill_source_map, region_with_source,
     remap_bilinear, remap_nearest,

@@ -5,11 +5,22 @@ use arrayvec::ArrayVec;
 use super::view::{ColourView, PixelFormat};
 use crate::geometry::PinholeCamera;
 use crate::photometric::LuminanceTable;
-use crate::transfer::LevelImage;
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Upper bound of pyramid levels.
 pub const MAX_LEVELS: usize = 6;
+
+/// One level of an image pyramid: linear intensities in `[0, 1]`, row-major without padding; at least 2x2 and at
+/// most 2^24 pixels.
+#[derive(Clone, Copy, Debug)]
+pub struct LevelImage<'a> {
+    /// `width * height` intensities.
+    pub pixels: &'a [f32],
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+}
 
 /// One level of a pyramid: linear luminance in `[0, 1]`, row-major without padding.
 #[derive(Debug)]

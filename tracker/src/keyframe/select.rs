@@ -3,10 +3,11 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::geometry::PinholeCamera;
+use crate::image::LevelImage;
 use crate::image::PixelRectangle;
 use crate::math::sqrt_f32;
 use crate::surface::SurfacePlanes;
-use crate::transfer::{LevelImage, PATTERN_RADIUS};
+use crate::transfer::PATTERN_RADIUS;
 
 /// A pixel of the reference image with the plane it lies on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]

@@ -59,7 +59,7 @@ pub fn floor_to_i32(x: f32) -> i32 {
     truncated - i32::from((truncated as f32) > x)
 }
 
-/// The integer nearest to `x`, halves rounded up: the rounding of `equations.md` section 4.3.
+/// The integer nearest to `x`, halves rounded up.
 #[inline]
 #[must_use]
 pub fn round_half_up_to_i32(x: f32) -> i32 {

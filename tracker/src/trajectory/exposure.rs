@@ -1,4 +1,4 @@
-//! Linear motion between the poses at shutter opening and closing (`equations.md` section 3).
+//! Linear motion between the poses at shutter opening and closing (MBA-SLAM equations 6 and 7).
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 

@@ -9,8 +9,8 @@ const MAX_PIXELS: usize = 1 << 24;
 
 /// Interpolates one image; splatted constants are kept beside it.
 ///
-/// Four neighbours are read as two pairs of adjacent floats, one 64-bit load each: measured against a hardware
-/// gather this is faster on every CPU tried and needs no `unsafe`.
+/// Four neighbours are read as two pairs of adjacent floats, one 64-bit load each. The bounds check per pair was
+/// measured to cost nothing: reading without it was not faster.
 pub(super) struct BilinearSampler<'a, S: Simd> {
     simd: S,
     /// All rows but the last, and all rows but the first: an index into one is the cell above or below.

@@ -69,6 +69,7 @@ pub(super) struct TransferKernel<'a, S: Simd> {
     /// `1/n` for n views.
     scale: f32,
     inverse_focal: [f32; 2],
+    current_size: [f32; 2],
     patch_views: [PatchView; MAX_VIRTUAL_VIEWS],
     batch: [Located<S>; BATCH],
 }
@@ -89,6 +90,7 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
             sampler: BilinearSampler::new(simd, &problem.reference)?,
             scale: 1.0 / views.len() as f32,
             inverse_focal: problem.focal.map(|focal| 1.0 / focal),
+            current_size: [problem.current.width as f32, problem.current.height as f32],
             patch_views: [PatchView::default(); MAX_VIRTUAL_VIEWS],
             batch: [Located { cell: Cell::first(simd), a: zero, b: zero }; BATCH],
         })
@@ -188,7 +190,7 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     fn observed(&self, site: &PatchSite, k: usize) -> S::mask32s {
         let u = load(self.simd, &PATTERN_DU_F32, k) + f32::from(site.u);
         let v = load(self.simd, &PATTERN_DV_F32, k) + f32::from(site.v);
-        let (width, height) = (self.problem.current.width as f32, self.problem.current.height as f32);
+        let [width, height] = self.current_size;
         (u.simd_ge(0.0) & u.simd_lt(width)) & (v.simd_ge(0.0) & v.simd_lt(height))
     }
 
@@ -204,8 +206,10 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     #[inline(always)]
     fn store_rows(&self, k: usize, sums: &RowSums<S>, valid: S::mask32s, out: &mut PatchRows) {
         let columns = sums.columns();
-        let total = columns.iter().fold(S::f32s::splat(self.simd, 0.0), |total, &column| total + column);
-        let valid = valid & total.is_finite();
+        // Any number that is not finite makes the total so; a tree, because a chain of twelve would be waited for.
+        let [a, b, c, d]: [S::f32s; 4] =
+            core::array::from_fn(|i| columns[i] + columns[i + 4] + columns[i + 8]);
+        let valid = valid & ((a + b) + (c + d) + sums.value).is_finite();
         self.store_values(k, sums.value, valid, &mut out.values);
         let (zero, scale) = (S::f32s::splat(self.simd, 0.0), S::f32s::splat(self.simd, self.scale));
         for (&column, pose) in columns.iter().zip(&mut out.pose) {

@@ -20,7 +20,5 @@ pub use evaluate::{
 };
 pub use pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 pub use pixel::{TransferredPixel, transfer_pixel};
-pub use problem::{
-    BrightnessModel, LevelImage, PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem,
-};
+pub use problem::{BrightnessModel, PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem};
 pub use virtual_view::{MAX_VIRTUAL_VIEWS, VirtualView, virtual_views};

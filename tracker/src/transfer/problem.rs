@@ -4,22 +4,11 @@ use bytemuck::{Pod, Zeroable};
 
 use super::pattern::PATCH_PIXELS;
 use super::virtual_view::VirtualView;
+pub(super) use crate::image::LevelImage;
 
 /// Columns of a Jacobian row: start translation, start rotation, end translation, end rotation (three each, left
 /// rotations), gain, offset.
 pub const ROW_LENGTH: usize = 14;
-
-/// One level of an image pyramid: linear intensities in `[0, 1]`, row-major without padding; at least 2x2 and at
-/// most 2^24 pixels.
-#[derive(Clone, Copy, Debug)]
-pub struct LevelImage<'a> {
-    /// `width * height` intensities.
-    pub pixels: &'a [f32],
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-}
 
 /// A keypoint as it is observed in the current frame; frozen while one linearisation is tried out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -69,7 +58,7 @@ pub struct TransferProblem<'a> {
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub struct PatchValues {
-    /// Mean reference intensity over the virtual views, per pattern pixel.
+    /// Mean reference intensity over the virtual views, per pattern pixel; zero where it is not valid.
     pub mean: [f32; PATCH_PIXELS],
     /// 1 where all virtual samples of the pixel were valid and the pixel lies in the current image, else 0.
     pub valid: [f32; PATCH_PIXELS],
@@ -87,7 +76,8 @@ impl Default for PatchValues {
 pub struct PatchRows {
     /// Predicted intensities.
     pub values: PatchValues,
-    /// Derivative of the mean by the twelve pose parameters (left rotations): `pose[column][pixel]`.
+    /// Derivative of the mean by the twelve pose parameters (left rotations): `pose[column][pixel]`; zero where
+    /// the pixel is not valid.
     pub pose: [[f32; PATCH_PIXELS]; 12],
 }
 

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
 
-use super::lighting::{Lamp, Lighting};
+use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
 use super::{Enclosure, Scene, Sweep, Thing, shadows};
@@ -24,7 +24,7 @@ pub(super) fn build() -> Scene {
     let lighting = Lighting {
         from_above: Vec3::new(0.3, 0.31, 0.34),
         from_below: Vec3::new(0.15, 0.14, 0.13),
-        lamps: vec![lamp(0.0, -2.0), lamp(0.5, 2.5), lamp(-5.0, 3.0), lamp(5.0, 0.0)],
+        lamps: Lamps::new(&[lamp(0.0, -2.0), lamp(0.5, 2.5), lamp(-5.0, 3.0), lamp(5.0, 0.0)]),
         shadows: shadows(&things, &[0.9]),
     };
     Scene::assemble(walls(), things, lighting, sweep())
@@ -48,7 +48,7 @@ fn walls() -> Enclosure {
 
 /// A column on a plinth under a capital.
 fn column(x: f32, z: f32, place: u32) -> [Thing; 3] {
-    let shaft = if place % 2 == 0 {
+    let shaft = if place.is_multiple_of(2) {
         Material::Marble { base: colour(0xd5cdbd), vein: colour(0x6d5a4c) }
     } else {
         Material::Rings { a: colour(0x9c5a42), b: colour(0xd9c3a0), width: 0.16 }

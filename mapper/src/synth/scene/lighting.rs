@@ -2,7 +2,7 @@
 //!
 //! Nothing depends on the direction of view, so a surface point has the same radiance in every frame.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec3, Vec4};
 
 use super::shape::Shape;
 
@@ -11,7 +11,7 @@ pub(super) struct Lighting {
     /// Light from above and from below, without direction.
     pub(super) from_above: Vec3,
     pub(super) from_below: Vec3,
-    pub(super) lamps: Vec<Lamp>,
+    pub(super) lamps: Lamps,
     pub(super) shadows: Vec<SoftShadow>,
 }
 
@@ -21,6 +21,45 @@ pub(super) struct Lamp {
     pub(super) colour: Vec3,
     /// Distance in metres at which its light has fallen to half.
     pub(super) reach: f32,
+}
+
+/// Up to four lamps side by side, so that one vector instruction serves all of them.
+pub(super) struct Lamps {
+    x: Vec4,
+    y: Vec4,
+    z: Vec4,
+    red: Vec4,
+    green: Vec4,
+    blue: Vec4,
+    inverse_reach2: Vec4,
+}
+
+impl Lamps {
+    pub(super) fn new<const N: usize>(lamps: &[Lamp; N]) -> Self {
+        const { assert!(N <= 4, "a vector has four lanes") };
+        let lane =
+            |value: fn(&Lamp) -> f32| Vec4::from(std::array::from_fn(|k| lamps.get(k).map_or(0.0, value)));
+        Self {
+            x: lane(|lamp| lamp.position.x),
+            y: lane(|lamp| lamp.position.y),
+            z: lane(|lamp| lamp.position.z),
+            red: lane(|lamp| lamp.colour.x),
+            green: lane(|lamp| lamp.colour.y),
+            blue: lane(|lamp| lamp.colour.z),
+            inverse_reach2: lane(|lamp| 1.0 / (lamp.reach * lamp.reach)),
+        }
+    }
+
+    /// Light at a point with this normal, wrapped around a little as that of lamps with a shade.
+    fn light(&self, point: Vec3, normal: Vec3) -> Vec3 {
+        let (x, y, z) = (self.x - point.x, self.y - point.y, self.z - point.z);
+        let distance2 = x * x + y * y + z * z;
+        let along_normal = x * normal.x + y * normal.y + z * normal.z;
+        let distance = Vec4::from(distance2.to_array().map(f32::sqrt));
+        let incidence = ((along_normal / distance + 0.25) / 1.25).max(Vec4::ZERO);
+        let arriving = incidence / (Vec4::ONE + distance2 * self.inverse_reach2);
+        Vec3::new(arriving.dot(self.red), arriving.dot(self.green), arriving.dot(self.blue))
+    }
 }
 
 /// The darkened patch that a thing leaves on the horizontal surface below it.
@@ -56,15 +95,7 @@ impl Lighting {
     /// Light arriving at a surface point, before corners and shadows are considered.
     pub(super) fn irradiance(&self, point: Vec3, normal: Vec3) -> Vec3 {
         let upward = 0.5 + 0.5 * normal.y;
-        let mut light = self.from_below.lerp(self.from_above, upward);
-        for lamp in &self.lamps {
-            let towards = lamp.position - point;
-            let distance2 = towards.length_squared();
-            let cosine = towards.dot(normal) / distance2.sqrt();
-            // Wrapped around a little, as light from a lamp with a shade is.
-            let incidence = ((cosine + 0.25) / 1.25).max(0.0);
-            light += lamp.colour * (incidence / (1.0 + distance2 / (lamp.reach * lamp.reach)));
-        }
+        let light = self.from_below.lerp(self.from_above, upward) + self.lamps.light(point, normal);
         if normal.y > 0.9 { light * self.shadow(point) } else { light }
     }
 

@@ -112,11 +112,15 @@ fn bricks(uv: Vec2, brick: Vec3, mortar: Vec3, pixel: f32) -> Vec3 {
     let (cell, f) = split(shifted);
     let wobble = 0.002 * noise(uv / 0.03, 31) * visibility(0.03, pixel);
     let to_joint = (f.min(Vec2::ONE - f) * PITCH).min_element() - 0.006 + wobble;
+    let share = edge(to_joint, 0.0, pixel);
+    let joint = mortar * (1.0 + 0.2 * noise(uv / 0.015, 36) * visibility(0.015, pixel));
+    if share == 0.0 {
+        return joint;
+    }
     let tone = 0.62 + 0.6 * random(cell, 32);
     let grain = 1.0 + 0.32 * layered_noise(uv, 0.05, 4, pixel, 33);
     let tint = Vec3::new(1.0, 0.8 + 0.35 * random(cell, 34), 0.8 + 0.3 * random(cell, 35));
-    let joint = mortar * (1.0 + 0.2 * layered_noise(uv, 0.02, 2, pixel, 36));
-    joint.lerp(brick * tint * tone * grain, edge(to_joint, 0.0, pixel))
+    joint.lerp(brick * tint * tone * grain, share)
 }
 
 fn wood(uv: Vec2, colour: Vec3, plank: f32, pixel: f32) -> Vec3 {

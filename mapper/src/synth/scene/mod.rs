@@ -151,10 +151,10 @@ impl Enclosure {
     /// Normal into the room, surface coordinates, look.
     fn surface(&self, point: Vec3) -> (Vec3, Vec2, &Material) {
         let centre = 0.5 * (self.low + self.high);
-        // The face is the nearest one, which a share of the half size does not tell in a long room.
+        // The face is the nearest one, which the share of the half size does not tell in a long room.
         let beyond = (point - centre).abs() - 0.5 * (self.high - self.low);
         let sign = (point - centre).signum();
-        let face = box_face(point, beyond.exp() * sign);
+        let face = box_face(point, sign / (1.0 - beyond));
         let side = usize::from(sign[face.axis] > 0.0);
         (-face.normal, face.uv, &self.materials[2 * face.axis + side])
     }

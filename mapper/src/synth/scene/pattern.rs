@@ -3,7 +3,10 @@
 //! `pixel` is the size in metres of a pixel on the surface. Detail fades out where it would be finer than the
 //! pixels, so that textures do not alias.
 
+use std::sync::LazyLock;
+
 use glam::{IVec2, Vec2, Vec3};
+use mba_tracker::photometric::InverseResponse;
 
 /// A hash of a lattice point; all 32 bits are usable.
 pub(super) fn hash(cell: IVec2, seed: u32) -> u32 {
@@ -34,10 +37,24 @@ pub(super) fn split(p: Vec2) -> (IVec2, Vec2) {
 pub(super) fn noise(p: Vec2, seed: u32) -> f32 {
     let (cell, f) = split(p);
     let s = f * f * (3.0 - 2.0 * f);
-    let value = |x, y| random(cell + IVec2::new(x, y), seed);
-    let low = value(0, 0) + (value(1, 0) - value(0, 0)) * s.x;
-    let high = value(0, 1) + (value(1, 1) - value(0, 1)) * s.x;
-    2.0 * (low + (high - low) * s.y) - 1.0
+    let seed = seed.wrapping_mul(0xcb1a_b31f);
+    let columns =
+        [cell.x as u32, (cell.x as u32).wrapping_add(1)].map(|x| x.wrapping_mul(0x8da6_b343) ^ seed);
+    let rows = [cell.y as u32, (cell.y as u32).wrapping_add(1)].map(|y| y.wrapping_mul(0xd816_3841));
+    let low = mix(lattice(columns[0] ^ rows[0]), lattice(columns[1] ^ rows[0]), s.x);
+    let high = mix(lattice(columns[0] ^ rows[1]), lattice(columns[1] ^ rows[1]), s.x);
+    mix(low, high, s.y)
+}
+
+fn mix(a: f32, b: f32, share: f32) -> f32 {
+    a + (b - a) * share
+}
+
+/// A number in `[-1, 1)` from the key of a lattice point: one round less than [`hash`], which noise needs often
+/// and can do without.
+fn lattice(key: u32) -> f32 {
+    let x = (key ^ (key >> 15)).wrapping_mul(0x2c1b_3c6d);
+    ((x ^ (x >> 14)) as i32) as f32 / 2_147_483_648.0
 }
 
 /// `octaves` layers of noise, the first with cells of size `coarsest` (metres), each next one twice as fine and
@@ -71,12 +88,15 @@ pub(super) fn stripe(x: f32, centre: f32, half: f32, pixel: f32) -> f32 {
     edge(half - (x - centre).abs(), 0.0, pixel)
 }
 
-/// A colour given as sRGB bytes, in linear light.
+/// Linear light of sRGB bytes.
+static LINEAR_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    let response = InverseResponse::srgb();
+    std::array::from_fn(|byte| response.linear_light(byte as u8))
+});
+
+/// A colour given as sRGB bytes `0xRRGGBB`, in linear light.
 pub(super) fn colour(rgb: u32) -> Vec3 {
-    let channel = |shift: u32| {
-        let value = ((rgb >> shift) & 0xff) as f32 / 255.0;
-        if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }
-    };
+    let channel = |shift: u32| LINEAR_LIGHT[(rgb >> shift) as usize & 0xff];
     Vec3::new(channel(16), channel(8), channel(0))
 }
 

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
 
-use super::lighting::{Lamp, Lighting};
+use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
 use super::room_furniture::{armchair, bookshelf, cartons, desk, round_table};
@@ -20,11 +20,11 @@ pub(super) fn build() -> Scene {
     let lighting = Lighting {
         from_above: Vec3::new(0.30, 0.31, 0.33),
         from_below: Vec3::new(0.17, 0.15, 0.13),
-        lamps: vec![
+        lamps: Lamps::new(&[
             Lamp { position: Vec3::new(0.4, 2.5, 0.6), colour: Vec3::new(0.95, 0.86, 0.72), reach: 2.4 },
             Lamp { position: Vec3::new(3.2, 1.9, -1.2), colour: Vec3::new(0.42, 0.5, 0.62), reach: 3.0 },
             Lamp { position: Vec3::new(-2.9, 1.7, 2.3), colour: Vec3::new(0.5, 0.36, 0.2), reach: 1.2 },
-        ],
+        ]),
         shadows: shadows(&things, &[0.74, 0.72]),
     };
     Scene::assemble(walls(), things, lighting, sweep())

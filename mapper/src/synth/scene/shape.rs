@@ -145,13 +145,13 @@ pub(super) fn box_face(local: Vec3, relative: Vec3) -> SurfacePoint {
     let size = relative.abs();
     if size.x >= size.y && size.x >= size.z {
         let sign = relative.x.signum();
-        SurfacePoint { normal: Vec3::X * sign, uv: Vec2::new(local.z * sign, local.y), axis: 0 }
+        SurfacePoint { normal: Vec3::X * sign, uv: Vec2::new(-local.z * sign, local.y), axis: 0 }
     } else if size.y >= size.z {
         let normal = Vec3::Y * relative.y.signum();
         SurfacePoint { normal, uv: Vec2::new(-local.x, local.z), axis: 1 }
     } else {
         let sign = relative.z.signum();
-        SurfacePoint { normal: Vec3::Z * sign, uv: Vec2::new(-local.x * sign, local.y), axis: 2 }
+        SurfacePoint { normal: Vec3::Z * sign, uv: Vec2::new(local.x * sign, local.y), axis: 2 }
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use nalgebra::Vector3;
 
-use super::lighting::Lighting;
+use super::lighting::{Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
 use super::{Enclosure, Scene, Sweep};
@@ -18,7 +18,7 @@ pub(super) fn build() -> Scene {
     let lighting = Lighting {
         from_above: Vec3::splat(0.75),
         from_below: Vec3::splat(0.75),
-        lamps: Vec::new(),
+        lamps: Lamps::new(&[]),
         shadows: Vec::new(),
     };
     Scene::assemble(enclosure, Vec::new(), lighting, sweep())

@@ -1,0 +1,56 @@
+//! `mba demo`.
+
+use std::path::Path;
+
+use mba_mapper::dataset::Dataset;
+use mba_mapper::run::Run;
+use mba_mapper::synth::{DepthSensor, NoiseModel, SynthConfig};
+
+use super::{open, synth, track};
+use crate::args::{Demo, Tracking};
+use crate::console::Console;
+use crate::report::{self, table};
+
+/// Synthesises a blurred sequence, tracks it, prints the figures and writes charts and report.
+///
+/// # Errors
+/// Failure when the folder cannot be written.
+pub fn run(args: &Demo, console: &Console) -> anyhow::Result<()> {
+    let (name, config) =
+        if args.quick { ("quick", quick()) } else { ("full", SynthConfig { frames: 60, ..realistic() }) };
+    let data = args.out.join(format!("data-{name}"));
+    let run = args.out.join(format!("run-{name}"));
+    let dataset = sequence(config, &data, console)?;
+    let summary = track::track_into(&dataset, &run, &Tracking::default(), console)?;
+    let path = report::write(&Run::open(&run)?, Some(&dataset))?;
+    console.result(&summary, table::summary)?;
+    console.note(format!("open {} in a browser", path.display()));
+    Ok(())
+}
+
+/// A sequence that is rendered and tracked within seconds.
+fn quick() -> SynthConfig {
+    SynthConfig { frames: 24, width: 320, height: 240, mean_blur_px: 5.0, ..realistic() }
+}
+
+/// A noisy camera and a structured-light depth sensor.
+fn realistic() -> SynthConfig {
+    SynthConfig {
+        mean_blur_px: 10.0,
+        noise: Some(NoiseModel::default()),
+        depth: DepthSensor::StructuredLight,
+        ..SynthConfig::default()
+    }
+}
+
+/// The sequence of an earlier demo in the same folder, or a new one.
+fn sequence(config: SynthConfig, folder: &Path, console: &Console) -> anyhow::Result<Dataset> {
+    // The lists of a sequence are written last, so one that can be opened is whole.
+    if let Ok(dataset) = mba_mapper::dataset::open(folder) {
+        console.note(format!("using the sequence in {}", folder.display()));
+        return Ok(dataset);
+    }
+    console.note(format!("rendering {} blurred frames into {}", config.frames, folder.display()));
+    synth::synthesise(config, folder, console)?;
+    open::dataset(folder)
+}

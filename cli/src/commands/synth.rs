@@ -1,0 +1,70 @@
+//! `mba synth`.
+
+use std::path::Path;
+
+use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset};
+use serde::Serialize;
+
+use crate::args::Synth;
+use crate::console::Console;
+use crate::failure::{OrBadInput, is_disk_full};
+use crate::report::table::pairs;
+
+/// What is printed.
+#[derive(Clone, Debug, Serialize)]
+pub struct Written {
+    folder: String,
+    frames: usize,
+    mean_blur_px: f64,
+    largest_p95_blur_px: f64,
+    largest_subframe_count: usize,
+}
+
+/// Renders a sequence and prints what was written.
+///
+/// # Errors
+/// Bad input when a setting is out of range or the folder is in use; failure when it cannot be written.
+pub fn run(args: &Synth, console: &Console) -> anyhow::Result<()> {
+    let written = synthesise(args.config(), &args.out, console)?;
+    console.result(&written, table)
+}
+
+/// Renders the sequence of `config` into the folder `out`.
+///
+/// # Errors
+/// As [`run`].
+pub fn synthesise(config: SynthConfig, out: &Path, console: &Console) -> anyhow::Result<Written> {
+    console.detail(format!("{config:?}"));
+    let sequence = SynthSequence::new(config).or_else(advise)?;
+    let progress = console.progress(sequence.len(), "rendering");
+    let summary = write_dataset(&sequence, out, |_, _| progress.inc(1));
+    progress.finish_and_clear();
+    let summary = summary.or_else(advise)?;
+    Ok(Written {
+        folder: out.display().to_string(),
+        frames: summary.frames,
+        mean_blur_px: summary.mean_blur_px,
+        largest_p95_blur_px: summary.largest_p95_px,
+        largest_subframe_count: summary.most_sub_frames,
+    })
+}
+
+fn advise<T>(error: SynthError) -> anyhow::Result<T> {
+    let hint = match error {
+        SynthError::File(error) if is_disk_full(&error) => return Err(error.into()),
+        SynthError::File(_) => "name a folder for --out that can be created or written",
+        SynthError::FolderNotEmpty { .. } => "nothing that exists is overwritten",
+        _ => "see `mba synth --help` for the ranges",
+    };
+    Err(error).or_bad_input(hint)
+}
+
+fn table(written: &Written) -> String {
+    pairs(&[
+        ("data set", written.folder.clone()),
+        ("frames", written.frames.to_string()),
+        ("mean blur", format!("{:.1} px", written.mean_blur_px)),
+        ("largest blur (p95)", format!("{:.1} px", written.largest_p95_blur_px)),
+        ("sub-frames, at most", written.largest_subframe_count.to_string()),
+    ])
+}

@@ -193,3 +193,38 @@ pub fn trajectory_error(results: &[FrameResult], frames: &[RenderedFrame]) -> f6
         results.iter().zip(frames).map(|(result, frame)| pose_error(result, frame, &frames[0]).0.powi(2));
     (squares.sum::<f64>() / results.len() as f64).sqrt()
 }
+
+/// Root mean square distance in pixels between where two cameras see the points that the first one sees 2.2 to 3 m
+/// away, over the image.
+#[must_use]
+pub fn pixels_between(
+    camera: &PinholeCamera,
+    world_from_a: &RigidTransform,
+    world_from_b: &RigidTransform,
+) -> f64 {
+    let b_from_a = world_from_b.inverse().compose(world_from_a);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for v in (0..camera.height).step_by(20) {
+        for u in (0..camera.width).step_by(20) {
+            let (u, v) = (u as f64, v as f64);
+            let point = camera.ray(u, v) * (2.2 + 0.8 * u / camera.width as f64);
+            let seen = camera.project(&b_from_a.transform_point(&point));
+            sum += (seen.x - u).powi(2) + (seen.y - v).powi(2);
+            count += 1.0;
+        }
+    }
+    f64::sqrt(sum / count)
+}
+
+/// Errors in pixels of the mid pose and of the motion from opening to closing, both poses in the same world.
+#[must_use]
+pub fn exposure_errors(
+    camera: &PinholeCamera,
+    found: &ExposureTrajectory,
+    truth: &ExposureTrajectory,
+) -> (f64, f64) {
+    let mid = pixels_between(camera, &truth.mid(), &found.mid());
+    // Both motions as seen from their own middle, which need not agree.
+    let end = |path: &ExposureTrajectory| path.mid().inverse().compose(&path.end);
+    (mid, 2.0 * pixels_between(camera, &end(truth), &end(found)))
+}

@@ -2,15 +2,17 @@
 
 use std::sync::LazyLock;
 
+use mba_tests::handheld::exposure_errors;
 use mba_tests::plane_scene::PlaneScene;
 use mba_tracker::align::{AlignSettings, LevelOutcome, MotionPrior};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::trajectory::ExposureTrajectory;
+use mba_tracker::transfer::PatchSite;
 use nalgebra::Vector6;
 
-use crate::pair::{Images, align, estimate, pixels, prior};
+use crate::pair::{Images, align, camera, estimate, prior};
 
-static SCENE: LazyLock<PlaneScene> = LazyLock::new(|| PlaneScene::corner(3, 0.08));
+static SCENE: LazyLock<PlaneScene> = LazyLock::new(|| PlaneScene::corner(3, 0.12));
 static KEYFRAME: LazyLock<Images> = LazyLock::new(|| Images::sharp(&SCENE, &RigidTransform::identity()));
 static FRAME: LazyLock<Images> = LazyLock::new(|| Images::blurred(&SCENE, &truth()));
 
@@ -38,14 +40,12 @@ fn settings(depth_term: bool) -> AlignSettings {
     AlignSettings { depth_term, ..AlignSettings::default() }
 }
 
-/// Errors of mid pose and motion in pixels.
-fn errors(outcome: &LevelOutcome) -> (f64, f64) {
-    let found = outcome.estimate.keyframe_from_camera;
-    (pixels(&truth().mid().tangent_to(&found.mid())), pixels(&(found.motion() - true_motion())))
+fn errors(found: &ExposureTrajectory, truth: &ExposureTrajectory) -> (f64, f64) {
+    exposure_errors(&camera(), found, truth)
 }
 
 fn check(name: &str, outcome: &LevelOutcome, mid_bound: f64, motion_bound: f64) {
-    let (mid, motion) = errors(outcome);
+    let (mid, motion) = errors(&outcome.estimate.keyframe_from_camera, &truth());
     let brightness = outcome.estimate.brightness;
     println!("{name}: mid {mid:.4} px, motion {motion:.4} px, {brightness:?}, {:?}", outcome.stop);
     assert!(mid < mid_bound, "{name}: mid pose wrong by {mid} px");
@@ -55,7 +55,7 @@ fn check(name: &str, outcome: &LevelOutcome, mid_bound: f64, motion_bound: f64) 
 #[test]
 fn both_ends_are_found_with_and_without_depth() {
     for (depth_term, mid, motion) in [(true, 0.05, 0.3), (false, 0.15, 0.3)] {
-        let outcome = align(&KEYFRAME, &FRAME, &settings(depth_term), estimate(near()), &wide_prior());
+        let (outcome, _) = align(&KEYFRAME, &FRAME, &settings(depth_term), estimate(near()), &wide_prior());
         check(&format!("depth term {depth_term}"), &outcome, mid, motion);
         assert_eq!(outcome.depth_points > 0, depth_term);
         assert!(outcome.views >= 4, "8 px of blur need several views, not {}", outcome.views);
@@ -67,14 +67,14 @@ fn gain_and_offset_are_found() {
     let (gain, offset) = (1.1, 0.01);
     let light = |byte: u8| (f64::from(byte) * gain + 255.0 * offset).round().min(255.0) as u8;
     let frame = Images { grey: FRAME.grey.iter().map(|&byte| light(byte)).collect(), ..FRAME.clone() };
-    // The expectation is no gain; let the data decide.
+    // The expectation is no gain; let the data decide. Bilinear samples of the reference lack 1 % of its contrast.
     let open = AlignSettings { gain_sigma: 1.0, offset_sigma: 1.0, ..settings(true) };
-    let outcome = align(&KEYFRAME, &frame, &open, estimate(near()), &wide_prior());
+    let (outcome, _) = align(&KEYFRAME, &frame, &open, estimate(near()), &wide_prior());
     check("gain", &outcome, 0.05, 0.3);
     let brightness = outcome.estimate.brightness;
-    assert!((f64::from(brightness.gain) - gain).abs() < 0.01, "{brightness:?}");
-    assert!((f64::from(brightness.offset) - offset).abs() < 0.005, "{brightness:?}");
-    let outcome = align(&KEYFRAME, &frame, &settings(true), estimate(near()), &wide_prior());
+    assert!((f64::from(brightness.gain) - gain).abs() < 0.02, "{brightness:?}");
+    assert!((f64::from(brightness.offset) - offset).abs() < 0.01, "{brightness:?}");
+    let (outcome, _) = align(&KEYFRAME, &frame, &settings(true), estimate(near()), &wide_prior());
     check("gain, default expectation", &outcome, 0.1, 0.5);
     assert!((f64::from(outcome.estimate.brightness.gain) - gain).abs() < 0.03);
 }
@@ -87,19 +87,21 @@ fn patches_on_a_foreign_object_are_dropped() {
     for (k, byte) in frame.grey.iter_mut().enumerate().filter(|(k, _)| inside(*k)) {
         *byte = if (k % 320 / 9 + k / 320 / 9) % 2 == 0 { 250 } else { 5 };
     }
-    let plain = align(&KEYFRAME, &FRAME, &settings(false), estimate(near()), &wide_prior());
-    let outcome = align(&KEYFRAME, &frame, &settings(false), estimate(near()), &wide_prior());
-    check("foreign object", &outcome, 0.2, 0.4);
-    assert!(plain.patches as f64 > 0.9 * plain.patches_in_view as f64, "{} kept", plain.patches);
-    // The object covers an eighth of the image.
-    let dropped = 1.0 - outcome.patches as f64 / outcome.patches_in_view as f64;
-    assert!((0.08..0.25).contains(&dropped), "{dropped} of the patches dropped");
+    let kept_inside = |frame: &Images| {
+        let (outcome, sites) = align(&KEYFRAME, frame, &settings(false), estimate(near()), &wide_prior());
+        let inside = |site: &&PatchSite| (204..276).contains(&site.u) && (64..176).contains(&site.v);
+        (sites.iter().filter(inside).count(), outcome)
+    };
+    let ((plain, _), (foreign, outcome)) = (kept_inside(&FRAME), kept_inside(&frame));
+    check("foreign object", &outcome, 0.1, 0.4);
+    assert!(plain >= 6, "{plain} patches were where the object is");
+    assert_eq!(foreign, 0, "patches on the object were kept");
 }
 
 #[test]
 fn a_start_without_motion_escapes_with_the_prior() {
     let still = ExposureTrajectory::still(near().mid());
-    let outcome = align(&KEYFRAME, &FRAME, &settings(true), estimate(still), &wide_prior());
+    let (outcome, _) = align(&KEYFRAME, &FRAME, &settings(true), estimate(still), &wide_prior());
     check("zero motion", &outcome, 0.05, 0.3);
 }
 
@@ -107,10 +109,8 @@ fn a_start_without_motion_escapes_with_the_prior() {
 fn the_direction_of_time_is_that_of_the_start_and_the_middle_does_not_care() {
     let start = estimate(near().reversed());
     let open = prior(Vector6::zeros(), 1.0, 1.0);
-    let outcome = align(&KEYFRAME, &FRAME, &settings(true), start, &open);
-    let found = outcome.estimate.keyframe_from_camera;
-    let mid = pixels(&truth().mid().tangent_to(&found.mid()));
-    let reversed = pixels(&(found.motion() + true_motion()));
+    let (outcome, _) = align(&KEYFRAME, &FRAME, &settings(true), start, &open);
+    let (mid, reversed) = errors(&outcome.estimate.keyframe_from_camera, &truth().reversed());
     println!("reversed: mid {mid} px, motion {reversed} px");
     assert!(mid < 0.05 && reversed < 0.3, "mid {mid} px, reversed motion {reversed} px");
 }
@@ -119,9 +119,9 @@ fn the_direction_of_time_is_that_of_the_start_and_the_middle_does_not_care() {
 fn without_blur_model_one_view_finds_the_middle() {
     let sharp_model = AlignSettings { blur: false, ..settings(true) };
     let start = estimate(ExposureTrajectory::still(near().mid()));
-    let outcome = align(&KEYFRAME, &FRAME, &sharp_model, start, &prior(Vector6::zeros(), 1e-6, 1e-6));
+    let (outcome, _) = align(&KEYFRAME, &FRAME, &sharp_model, start, &prior(Vector6::zeros(), 1e-6, 1e-6));
     assert_eq!(outcome.views, 1);
-    let (mid, _) = errors(&outcome);
+    let (mid, _) = errors(&outcome.estimate.keyframe_from_camera, &truth());
     assert!(mid < 0.3, "{mid} px");
     assert!(outcome.estimate.keyframe_from_camera.motion().norm() < 1e-4);
 }
@@ -130,7 +130,7 @@ fn without_blur_model_one_view_finds_the_middle() {
 fn nothing_in_view_changes_nothing() {
     let away = RigidTransform::identity().perturbed(&Vector6::new(0.0, 0.0, 0.0, 0.0, 3.0, 0.0));
     let start = estimate(ExposureTrajectory::still(away));
-    let outcome = align(&KEYFRAME, &FRAME, &settings(true), start, &wide_prior());
+    let (outcome, _) = align(&KEYFRAME, &FRAME, &settings(true), start, &wide_prior());
     assert_eq!(outcome.stop, mba_tracker::align::StopReason::NoData);
     assert_eq!(outcome.estimate, start);
     assert_eq!((outcome.patches, outcome.depth_points), (0, 0));

@@ -57,14 +57,15 @@ impl Images {
     }
 }
 
-/// Aligns `frame` with `keyframe` on all levels from `start`, each level from the outcome of the one before.
+/// Aligns `frame` with `keyframe` on all levels from `start`, each level from the outcome of the one before. Returns
+/// also where the patches were on the finest level.
 pub(crate) fn align(
     keyframe_images: &Images,
     frame_images: &Images,
     settings: &AlignSettings,
     start: Estimate,
     prior: &MotionPrior,
-) -> LevelOutcome {
+) -> (LevelOutcome, Vec<PatchSite>) {
     let camera = camera();
     let region = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
     let mut memory = vec![0; 8 << 20];
@@ -101,7 +102,8 @@ pub(crate) fn align(
             LevelPlan { level, depth_stride: 2, max_iterations: 20, min_step: 0.005, blur: settings.blur };
         outcome = alignment.align_level(&plan, outcome.estimate, prior, &mut scratch);
     }
-    outcome
+    let sites = scratch.sites[..outcome.patches].to_vec();
+    (outcome, sites)
 }
 
 /// A belief about the motion with standard deviations in metres and radians.
@@ -113,10 +115,4 @@ pub(crate) fn prior(expected: Vector6<f64>, metres: f64, radians: f64) -> Motion
 /// An estimate without gain and offset.
 pub(crate) fn estimate(keyframe_from_camera: ExposureTrajectory) -> Estimate {
     Estimate { keyframe_from_camera, brightness: BrightnessModel::default() }
-}
-
-/// Image motion in pixels that a tangent vector causes at 2.5 m.
-pub(crate) fn pixels(tangent: &Vector6<f64>) -> f64 {
-    let translation = tangent.fixed_rows::<3>(0).norm() / 2.5;
-    camera().fx * translation.hypot(tangent.fixed_rows::<3>(3).norm())
 }

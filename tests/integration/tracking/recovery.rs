@@ -19,19 +19,22 @@ fn several_lost_frames_hold_the_pose_and_the_next_good_one_is_found() {
         assert_eq!(result.status, FrameStatus::Lost, "frame {}", result.index);
         assert_eq!(result.world_from_camera.mid(), held);
     }
-    for (result, frame) in results.iter().zip(&frames).skip(12) {
+    // The first frame may be found only roughly: six frames of motion have passed unseen.
+    for (result, frame) in results.iter().zip(&frames).skip(13) {
         let (metres, _) = pose_error(result, frame, &frames[0]);
-        assert_ne!(result.status, FrameStatus::Lost, "frame {}", result.index);
+        assert_eq!(result.status, FrameStatus::Ok, "frame {}", result.index);
         assert!(metres < 0.003, "frame {}: {metres} m", result.index);
     }
 }
 
 #[test]
 fn an_older_keyframe_is_found_after_moving_back_unseen() {
-    let at =
-        |metres: f64| RigidTransform::new(so3::exp(&(Vector3::y() * 0.1 * metres)), Vector3::x() * metres);
+    // A pan to the left wall, which holds the camera sideways.
+    let at = |radians: f64| {
+        RigidTransform::new(so3::exp(&(Vector3::y() * -radians)), Vector3::new(-0.3 * radians, 0.0, 0.0))
+    };
     let away = 14;
-    let mut frames: Vec<_> = (0..away).map(|k| still_frame(&ROOM, k, at(0.08 * k as f64))).collect();
+    let mut frames: Vec<_> = (0..away).map(|k| still_frame(&ROOM, k, at(0.04 * k as f64))).collect();
     let blind = still_frame(&ROOM, 0, at(0.0)).replaced(|_| 0, |_, _| 0);
     for k in away..away + 10 {
         let mut frame = blind.clone();
@@ -42,9 +45,6 @@ fn an_older_keyframe_is_found_after_moving_back_unseen() {
         frames.push(still_frame(&ROOM, k, HAND.pose(0.02 * (k - away - 10) as f64)));
     }
     let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
-    for result in &results {
-        println!("{} {:?} {} of {}", result.index, result.status, result.is_keyframe, result.reference_index);
-    }
     assert!(results[1..away].iter().any(|result| result.is_keyframe), "no keyframe was replaced");
     assert!(results[away..away + 10].iter().all(|result| result.status == FrameStatus::Lost));
     for (result, frame) in results.iter().zip(&frames).skip(away + 10) {

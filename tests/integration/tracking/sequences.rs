@@ -1,8 +1,8 @@
 //! Accuracy and repeatability on whole sequences.
 
 use mba_tests::handheld::{
-    RenderedFrame, Shake, camera_of_width, sequence, track_all, track_anew, tracker_config, trajectory_error,
-    workspace,
+    RenderedFrame, Shake, camera_of_width, exposure_errors, pose_error, sequence, track_all, track_anew, tracker_config,
+    trajectory_error, workspace,
 };
 use mba_tests::plane_scene::PlaneScene;
 use mba_tracker::geometry::{RigidTransform, so3};
@@ -30,7 +30,7 @@ fn true_blur(frame: &RenderedFrame) -> f64 {
 #[test]
 fn small_sequence_is_followed_with_and_without_depth() {
     let mut config = tracker_config(camera_of_width(160));
-    for (depth_term, bound) in [(true, 0.001), (false, 0.006)] {
+    for (depth_term, bound) in [(true, 0.001), (false, 0.012)] {
         config.align.depth_term = depth_term;
         let results = track_anew(&config, &SMALL);
         assert_all_ok(&results);
@@ -51,16 +51,15 @@ fn blurred_sequence_yields_poses_at_both_ends_of_the_exposure() {
     assert!(error < 0.001, "{error} m");
     let mut blurred = 0;
     for (result, frame) in results.iter().zip(&frames).skip(2) {
-        let (truth, estimate) = (frame.truth.motion(), result.world_from_camera.motion());
-        if true_blur(frame) < 2.0 {
+        if true_blur(frame) < 2.4 {
             continue;
         }
         blurred += 1;
-        let cosine = truth.dot(&estimate) / (truth.norm() * estimate.norm());
-        println!("frame {}: {:.1} px, {truth:.4?} {estimate:.4?}", result.index, true_blur(frame));
-        assert!(cosine > 0.0, "frame {}: time runs backwards", result.index);
-        let pixels = camera_of_width(320).fx * (truth - estimate).fixed_rows::<3>(3).norm();
-        assert!(pixels < 0.35, "frame {}: motion is wrong by {pixels} px", result.index);
+        let truth = frame.truth.seen_from(&frames[0].truth.mid().inverse());
+        let (mid, motion) = exposure_errors(&camera_of_width(320), &result.world_from_camera, &truth);
+        println!("frame {}: {:.1} px, errors {mid:.3} and {motion:.3} px", result.index, true_blur(frame));
+        // With time running backwards the motion would be wrong by twice the blur.
+        assert!(mid < 0.1 && motion < 0.8, "frame {}: mid {mid} px, motion {motion} px", result.index);
     }
     assert!(blurred >= 6, "only {blurred} frames are blurred");
 }
@@ -153,24 +152,19 @@ fn gyroscope_keeps_a_sudden_turn() {
     let frames = sudden_turn(RATE);
     let config = tracker_config(camera_of_width(160));
     let without = track_anew(&config, &frames);
-    println!("without: {:?}", without.iter().map(|r| (r.status, r.iterations)).collect::<Vec<_>>());
     let mut memory = workspace(&config);
     let mut tracker = Tracker::new(&config, SimdLevel::new(), &mut memory).expect("memory");
-    let mut iterations = (0, 0);
     for (k, frame) in frames.iter().enumerate() {
         let rate = if k > 4 { RATE } else { 0.0 };
         let mut view = frame.view();
         view.angular_velocity = Some(Vector3::y() * rate);
         let result = tracker.track(&view).expect("a valid frame");
-        println!("with: {:?} {}", result.status, result.iterations);
+        let (metres, radians) = pose_error(&result, frame, &frames[0]);
+        let (metres_without, _) = pose_error(&without[k], frame, &frames[0]);
+        println!("{:?} {metres:.4} m, without {:?} {metres_without:.4} m", result.status, without[k].status);
+        // The first frame of the turn is 40 px away from where a camera at rest would be.
         assert_ne!(result.status, FrameStatus::Lost, "frame {k}");
-        let (metres, radians) = mba_tests::handheld::pose_error(&result, frame, &frames[0]);
         assert!(metres < 0.005 && radians < 0.002, "frame {k}: {metres} m, {radians} rad");
-        if k == 5 {
-            iterations = (result.iterations, without[k].iterations);
-        }
+        assert!(metres <= metres_without + 1e-4, "frame {k}: {metres} m, without {metres_without} m");
     }
-    // The first frame of the turn is 40 px away from where a camera at rest would be.
-    let helped = without[5].status == FrameStatus::Lost || iterations.0 < iterations.1;
-    assert!(helped, "{iterations:?} linearisations with and without");
 }

@@ -1,7 +1,7 @@
 //! The order in which levels and first guesses are tried.
 
 use arrayvec::ArrayVec;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use super::history::Motion;
 use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, MotionPrior};
@@ -12,14 +12,14 @@ use crate::transfer::BrightnessModel;
 /// Levels on which several first guesses compete.
 const COMPETING_LEVELS: usize = 2;
 
-/// A guess this much worse than what recent frames ended with is not trusted alone.
-const TRUSTED_SCORE_RATIO: f64 = 1.25;
-
 /// Steps below this many pixels of a competing level are left to the finer ones.
 const COMPETING_MIN_STEP: f64 = 0.1;
 
 /// Upper bound of first guesses.
-const MAX_GUESSES: usize = 6;
+const MAX_GUESSES: usize = 16;
+
+/// When the motion is unknown, turns by this many pixels of the coarsest level are tried in eight directions.
+const SEARCH_PIXELS: f64 = 3.0;
 
 /// One frame to be aligned with one reference.
 #[derive(Clone, Copy, Debug)]
@@ -36,8 +36,6 @@ pub(super) struct FrameTask<'a> {
     pub(super) blur: bool,
     /// Typical inverse depth of the scene, 1/m.
     pub(super) inverse_depth: f64,
-    /// Score that recent frames ended the competing levels with; infinite if any is fine.
-    pub(super) trusted_score: f64,
 }
 
 /// A finished alignment.
@@ -47,8 +45,6 @@ pub(super) struct Aligned {
     pub(super) outcome: LevelOutcome,
     /// Linearisations on all levels.
     pub(super) iterations: usize,
-    /// Score after the competing levels: lower is better.
-    pub(super) score: f64,
 }
 
 impl FrameTask<'_> {
@@ -63,16 +59,26 @@ impl FrameTask<'_> {
             guesses.push(self.motion.extrapolate(&rate, dt));
         }
         guesses.push(self.motion.extrapolate(&steady, dt));
-        if let Some(rate) = self.motion.within_exposure {
-            guesses.push(self.motion.extrapolate(&rate, dt));
+        match self.motion.within_exposure {
+            Some(rate) => guesses.push(self.motion.extrapolate(&rate, dt)),
+            None => guesses.extend(self.turns()),
         }
         guesses.push(self.motion.reference_from_mid);
         guesses.push(self.motion.extrapolate(&-steady, dt));
         guesses
     }
 
-    /// Aligns coarse to fine. The guesses compete on the coarsest levels, one after the other until one ends as
-    /// well as recent frames did; the best goes on alone.
+    /// The last pose turned up, down, sideways and diagonally.
+    fn turns(&self) -> impl Iterator<Item = RigidTransform> {
+        let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
+        let angle = SEARCH_PIXELS / self.alignment.camera.at_level(coarsest).fx;
+        let last = self.motion.reference_from_mid;
+        let directions = (0..9).filter(|k| *k != 4).map(|k| (f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0));
+        directions.map(move |(x, y)| last.perturbed(&Vector6::new(0.0, 0.0, 0.0, x * angle, y * angle, 0.0)))
+    }
+
+    /// Aligns coarse to fine. The guesses compete on the coarsest levels, where an iteration costs next to nothing;
+    /// the best goes on alone.
     pub(super) fn run(&self, guesses: &[RigidTransform], scratch: &mut AlignScratch) -> Aligned {
         let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
@@ -90,20 +96,18 @@ impl FrameTask<'_> {
             if best.as_ref().is_none_or(|(best_score, _)| score < *best_score) {
                 best = Some((score, outcome));
             }
-            if score < TRUSTED_SCORE_RATIO * self.trusted_score {
-                break;
-            }
         }
-        let (score, mut outcome) = best.unwrap_or_else(|| {
-            (f64::MAX, LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)))
-        });
+        let mut outcome = best.map_or_else(
+            || LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)),
+            |(_, outcome)| outcome,
+        );
         for level in (0..last_competing).rev() {
             let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
             outcome = self.level(level, start, scratch);
             iterations += outcome.iterations;
         }
         outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
-        Aligned { outcome, iterations, score }
+        Aligned { outcome, iterations }
     }
 
     fn level(&self, level: usize, start: Estimate, scratch: &mut AlignScratch) -> LevelOutcome {

@@ -280,7 +280,6 @@ impl<'m> Tracker<'m> {
             brightness: self.brightness,
             blur,
             inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),
-            trusted_score: self.typical.score,
         };
         match start {
             Some(mid) => task.run(&[mid], &mut self.scratch),
@@ -341,7 +340,7 @@ impl<'m> Tracker<'m> {
         self.brightness = outcome.estimate.brightness;
         self.lost_frames = 0;
         if status == FrameStatus::Ok {
-            self.typical.learn(outcome, aligned.score);
+            self.typical.learn(outcome);
         }
         let wanted = wants_keyframe(&evidence, self.keyframe.blur, self.config.camera.width);
         if status == FrameStatus::Ok && wanted {

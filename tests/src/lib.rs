@@ -1,5 +1,7 @@
 //! Helpers shared by the whole-system tests.
 
+pub mod handheld;
+pub mod plane_scene;
 pub mod reference_values;
 pub mod small_dataset;
 pub mod transfer_scene;

@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 pub use fearless_simd::Level;
+#[cfg(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64"))]
 use fearless_simd::Simd;
 
 /// Every level that a CPU with level `best` can run, weakest first; used to compare levels with each other.

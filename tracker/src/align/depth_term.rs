@@ -27,7 +27,8 @@ pub struct DepthProblem<'a> {
     pub camera: PinholeCamera,
     /// Step between the pixels of the current map that take part.
     pub stride: usize,
-    /// Residuals beyond this many 1/m belong to another surface.
+    /// Residuals beyond this many 1/m belong to another surface: they cost as much as one at the gate and pull
+    /// nowhere.
     pub gate: f32,
 }
 
@@ -46,8 +47,10 @@ struct DepthSample {
 pub struct DepthSums {
     /// Robust cost in squared standard deviations.
     pub cost: f64,
-    /// Number of compared points.
+    /// Number of compared points within the gate.
     pub points: f64,
+    /// Number of compared points beyond the gate.
+    pub gated: f64,
     /// Gauss-Newton matrix.
     pub hessian: Matrix6<f64>,
     /// Gradient.
@@ -90,21 +93,36 @@ impl DepthProblem<'_> {
         sigma: f32,
         delta: f32,
     ) -> DepthSums {
-        let mut sums =
-            DepthSums { cost: 0.0, points: 0.0, hessian: Matrix6::zeros(), gradient: Vector6::zeros() };
+        let mut sums = DepthSums {
+            cost: 0.0,
+            points: 0.0,
+            gated: 0.0,
+            hessian: Matrix6::zeros(),
+            gradient: Vector6::zeros(),
+        };
         let mut batch = DepthBatch::new(delta);
         let inverse_sigma = 1.0 / sigma;
-        self.for_each_sample(keyframe_from_camera, |sample| {
+        let gated = self.for_each_sample(keyframe_from_camera, |sample| {
             let (normal, residual) = (sample.normal * inverse_sigma, sample.residual * inverse_sigma);
             batch.push(simd, normal, sample.arm, residual, &mut sums);
         });
         batch.flush(simd, &mut sums);
+        // Without their cost, a step that brings points into the gate would look like a step uphill.
+        let clipped = delta.min(self.gate * inverse_sigma);
+        sums.gated = gated as f64;
+        sums.cost += sums.gated * f64::from(clipped * (self.gate * inverse_sigma - 0.5 * clipped));
         sums.hessian.fill_lower_triangle_with_upper_triangle();
         sums
     }
 
+    /// Visits the samples within the gate; returns the number of those beyond it.
     #[inline(always)]
-    fn for_each_sample(&self, keyframe_from_camera: &RigidTransform, mut visit: impl FnMut(DepthSample)) {
+    fn for_each_sample(
+        &self,
+        keyframe_from_camera: &RigidTransform,
+        mut visit: impl FnMut(DepthSample),
+    ) -> usize {
+        let mut gated = 0;
         let rotation = keyframe_from_camera.rotation_matrix().map(|x| x as f32);
         let position = keyframe_from_camera.translation.map(|x| x as f32);
         let (fx, fy) = (self.camera.fx as f32, self.camera.fy as f32);
@@ -131,6 +149,7 @@ impl DepthProblem<'_> {
                 let Some(surface) = self.keyframe.sample(ku, kv) else { continue };
                 let residual = inverse_z - surface;
                 if residual.abs() >= self.gate {
+                    gated += 1;
                     continue;
                 }
                 let index = round_half_up_to_i32(kv) as usize * width + round_half_up_to_i32(ku) as usize;
@@ -143,6 +162,7 @@ impl DepthProblem<'_> {
                 visit(DepthSample { residual, normal, arm });
             }
         }
+        gated
     }
 }
 

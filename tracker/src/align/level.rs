@@ -228,7 +228,7 @@ fn descend(
             return Descent::Stopped(StopReason::IterationLimit);
         }
         let candidate = outcome.estimate.stepped(&step);
-        let next = objective.linearise(&candidate, Some((at.pixels, at.depth_points)), costs);
+        let next = objective.linearise(&candidate, Some((at.pixels, at.depth_compared)), costs);
         outcome.iterations += 1;
         let ratio = gain_ratio(&at, &next, &step);
         if next.cost < at.cost && ratio > MIN_GAIN_RATIO {

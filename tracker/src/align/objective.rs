@@ -96,6 +96,8 @@ pub(super) struct Linearised {
     pub pixels: f64,
     /// Depth points that took part.
     pub depth_points: f64,
+    /// Depth points that were compared, within the gate or beyond.
+    pub depth_compared: f64,
 }
 
 impl Objective<'_> {
@@ -120,6 +122,7 @@ impl Objective<'_> {
             gradient: photometric.gradient * weight,
             pixels,
             depth_points: 0.0,
+            depth_compared: 0.0,
         };
         if let Some(depth) = &self.depth {
             self.add_depth(depth, trajectory, expected_counts.map(|counts| counts.1), &mut sums);
@@ -141,11 +144,12 @@ impl Objective<'_> {
     ) {
         let depth_sums =
             depth.problem.linearise(self.simd, &trajectory.mid(), depth.sigma, self.settings.huber);
-        let weight =
-            depth.weight * expected_points.map_or(1.0, |expected| count_ratio(expected, depth_sums.points));
+        let compared = depth_sums.points + depth_sums.gated;
+        let weight = depth.weight * expected_points.map_or(1.0, |expected| count_ratio(expected, compared));
         let to_ends = mid_from_ends(trajectory);
         sums.cost += weight * depth_sums.cost;
         sums.depth_points = depth_sums.points;
+        sums.depth_compared = compared;
         let mut block = sums.hessian.fixed_view_mut::<12, 12>(0, 0);
         block += to_ends.transpose() * depth_sums.hessian * to_ends * weight;
         let mut rows = sums.gradient.fixed_rows_mut::<12>(0);

@@ -105,3 +105,84 @@ impl EndView {
         [y[0] * inverse_z, y[1] * inverse_z]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use nalgebra::Vector6;
+
+    use super::*;
+
+    const CAMERA: PinholeCamera =
+        PinholeCamera { width: 100, height: 72, fx: 90.0, fy: 95.0, cx: 48.0, cy: 36.0 };
+    const INVERSE_DEPTH: f32 = 0.4;
+
+    /// The flow of `motion`, as centre and displacement per block, and the longest; the left half of the image has
+    /// a plane, the rest the fallback of twice its inverse depth.
+    fn flow(motion: Vector6<f64>) -> (Vec<([f64; 2], [f64; 2])>, f32) {
+        let (width, height) = (50, 36);
+        let mut value: Vec<f32> =
+            (0..width * height).map(|k| if k % width < 24 { INVERSE_DEPTH } else { 0.0 }).collect();
+        let (mut slope_u, mut slope_v) = (vec![0.0; width * height], vec![0.0; width * height]);
+        let planes =
+            SurfacePlanes { value: &mut value, slope_u: &mut slope_u, slope_v: &mut slope_v, width, height };
+        let mut memory = vec![0; BlurFlow::bytes(100, 72) + 64];
+        let mut flow = BlurFlow::carve(&mut Arena::new(&mut memory), 100, 72).expect("memory");
+        let exposure = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &motion);
+        let longest = flow.fill(&exposure, &CAMERA, &planes, 1, 2.0 * INVERSE_DEPTH);
+        let per_row = flow.blocks_per_row();
+        let centre = |b: usize| [(b % per_row * 8) as f64 + 3.5, (b / per_row * 4) as f64 + 1.5];
+        let blocks = flow.displacement.iter().enumerate();
+        (blocks.map(|(b, d)| (centre(b), d.map(f64::from))).collect(), longest)
+    }
+
+    fn check(motion: Vector6<f64>, expected: impl Fn(f64, f64, f64) -> [f64; 2]) {
+        let (blocks, longest) = flow(motion);
+        let mut largest = 0.0f64;
+        for ([u, v], got) in blocks {
+            let rho = f64::from(INVERSE_DEPTH) * if u < 48.0 { 1.0 } else { 2.0 };
+            let want = expected(u, v, rho);
+            let error = (got[0] - want[0]).hypot(got[1] - want[1]);
+            assert!(error < 1e-4, "({u}, {v}): {got:?} instead of {want:?}");
+            largest = largest.max(want[0].hypot(want[1]));
+        }
+        assert!((f64::from(longest) - largest).abs() < 1e-4, "longest {longest}, not {largest}");
+    }
+
+    #[test]
+    fn sideways_motion_shifts_by_its_parallax() {
+        check(Vector6::new(0.05, -0.02, 0.0, 0.0, 0.0, 0.0), |_, _, rho| {
+            [90.0 * 0.05 * rho, -95.0 * 0.02 * rho]
+        });
+    }
+
+    #[test]
+    fn approach_expands_from_the_principal_point() {
+        check(Vector6::new(0.0, 0.0, 0.2, 0.0, 0.0, 0.0), |u, v, rho| {
+            // x/(1 + t rho/2) - x/(1 - t rho/2) = -x t rho/(1 - (t rho/2)^2)
+            let factor = -0.2 * rho / (1.0 - (0.1 * rho).powi(2));
+            [(u - 48.0) * factor, (v - 36.0) * factor]
+        });
+    }
+
+    #[test]
+    fn roll_turns_about_the_principal_point() {
+        check(Vector6::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.1), |u, v, _| {
+            // The chord of the arc: 2 sin(angle/2) along the tangent.
+            let chord = 2.0 * 0.05f64.sin();
+            [-chord * (v - 36.0) / 95.0 * 90.0, chord * (u - 48.0) / 90.0 * 95.0]
+        });
+    }
+
+    #[test]
+    fn pan_follows_the_tangent_of_the_angle() {
+        check(Vector6::new(0.0, 0.0, 0.0, 0.0, 0.06, 0.0), |u, v, _| {
+            let angle = ((u - 48.0) / 90.0).atan();
+            let column = |turn: f64| 90.0 * (angle + turn).tan();
+            let row = |turn: f64| (v - 36.0) * angle.cos() / (angle + turn).cos();
+            [column(0.03) - column(-0.03), row(0.03) - row(-0.03)]
+        });
+    }
+}

@@ -142,3 +142,110 @@ fn blur_border_block(image: &[f32], flow: &BlurFlow, taps: &Taps, u: usize, v: u
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::simd::{level_name, levels_up_to};
+
+    /// Neither whole blocks across nor down.
+    const WIDTH: usize = 45;
+    const HEIGHT: usize = 30;
+
+    fn texture(u: f32, v: f32) -> f32 {
+        0.5 + 0.2 * (0.5 * u + 0.3 * v).sin() + 0.2 * (0.7 * v - 0.2 * u).cos()
+    }
+
+    fn image() -> Vec<f32> {
+        (0..WIDTH * HEIGHT).map(|k| texture((k % WIDTH) as f32, (k / WIDTH) as f32)).collect()
+    }
+
+    /// The bilinear value of an image with continued border.
+    fn bilinear(image: &[f32], u: f32, v: f32) -> f32 {
+        let at = |i: f32, j: f32| {
+            let (i, j) = (i.clamp(0.0, WIDTH as f32 - 1.0), j.clamp(0.0, HEIGHT as f32 - 1.0));
+            image[j as usize * WIDTH + i as usize]
+        };
+        let (i, j) = (u.floor(), v.floor());
+        let (fu, fv) = (u - i, v - j);
+        let top = (1.0 - fu) * at(i, j) + fu * at(i + 1.0, j);
+        let bottom = (1.0 - fu) * at(i, j + 1.0) + fu * at(i + 1.0, j + 1.0);
+        (1.0 - fv) * top + fv * bottom
+    }
+
+    fn blurred(level: Level, image: &[f32], displacement: &mut [[f32; 2]], views: usize) -> Vec<f32> {
+        let flow = BlurFlow { width: WIDTH, height: HEIGHT, displacement };
+        let mut out = vec![f32::NAN; WIDTH * HEIGHT];
+        blur_along(level, image, &flow, views, &mut out);
+        out
+    }
+
+    fn blocks() -> usize {
+        WIDTH.div_ceil(BLOCK_WIDTH) * HEIGHT.div_ceil(BLOCK_HEIGHT)
+    }
+
+    #[test]
+    fn constant_flow_is_the_mean_of_shifted_images_at_every_level() {
+        let image = image();
+        for ([du, dv], views) in
+            [([6.0, 0.0], 3), ([-4.0, 8.0], 4), ([0.0, 0.0], 3), ([13.7, -5.3], 9), ([100.0, 60.0], 32)]
+        {
+            for level in levels_up_to(Level::new()) {
+                let out = blurred(level, &image, &mut vec![[du, dv]; blocks()], views);
+                for (k, &light) in out.iter().enumerate() {
+                    let (u, v) = ((k % WIDTH) as f32, (k / WIDTH) as f32);
+                    let sum: f32 = (0..views)
+                        .map(|i| {
+                            let s = (i as f32 + 0.5) / views as f32 - 0.5;
+                            bilinear(&image, u + s * du, v + s * dv)
+                        })
+                        .sum();
+                    let expected = sum / views as f32;
+                    let name = level_name(level);
+                    assert!(
+                        (light - expected).abs() < 1e-5,
+                        "{name} ({du}, {dv}) at {k}: {light} not {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn operator_is_its_own_adjoint() {
+        // Zero near the border: there the continued image makes a difference.
+        let window = |k: usize| {
+            let inside = (12..WIDTH - 12).contains(&(k % WIDTH)) && (8..HEIGHT - 8).contains(&(k / WIDTH));
+            if inside { 1.0 } else { 0.0 }
+        };
+        let pixels = WIDTH * HEIGHT;
+        let x: Vec<f32> =
+            (0..pixels).map(|k| window(k) * texture((k % WIDTH) as f32, (k / WIDTH) as f32)).collect();
+        let y: Vec<f32> =
+            (0..pixels).map(|k| window(k) * texture((k / WIDTH) as f32 * 2.0, (k % WIDTH) as f32)).collect();
+        let dot = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| f64::from(a * b)).sum::<f64>();
+        let per_row = WIDTH.div_ceil(BLOCK_WIDTH);
+        // Constant flow, and flow that changes by half a pixel per block as a strong roll would cause.
+        for (change, bound) in [(0.0, 1e-6), (0.5, 2e-3)] {
+            let mut flow: Vec<[f32; 2]> = (0..blocks())
+                .map(|b| [6.0 + change * (b / per_row) as f32, 3.0 - change * (b % per_row) as f32])
+                .collect();
+            let level = Level::new();
+            let ax_y = dot(&blurred(level, &x, &mut flow, 6), &y);
+            let x_ay = dot(&x, &blurred(level, &y, &mut flow, 6));
+            let relative = (ax_y - x_ay).abs() / ax_y;
+            assert!(relative < bound, "change {change}: {ax_y} and {x_ay}, {relative}");
+        }
+    }
+
+    #[test]
+    fn buffers_that_are_too_short_are_left_alone() {
+        let flow = BlurFlow { width: WIDTH, height: HEIGHT, displacement: &mut vec![[1.0, 0.0]; blocks()] };
+        let mut out = vec![7.0; WIDTH * HEIGHT - 1];
+        blur_along(Level::new(), &image(), &flow, 3, &mut out);
+        assert!(out.iter().all(|light| *light == 7.0));
+    }
+}

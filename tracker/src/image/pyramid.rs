@@ -121,3 +121,55 @@ fn halve_row(top: &[f32], bottom: &[f32], row: &mut [f32]) {
         *out = 0.25 * ((t[0] + t[1]) + (b[0] + b[1]));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::*;
+    use crate::photometric::InverseResponse;
+
+    const CAMERA: PinholeCamera =
+        PinholeCamera { width: 48, height: 32, fx: 40.0, fy: 41.0, cx: 23.0, cy: 16.5 };
+
+    #[test]
+    fn every_level_keeps_the_mean_and_the_position_of_a_ramp() {
+        let mut memory = vec![0; GreyPyramid::bytes(48, 32, 4) + 64];
+        let mut pyramid = GreyPyramid::carve(&mut Arena::new(&mut memory), &CAMERA, 4).expect("memory");
+        let bytes: Vec<u8> = (0..48 * 32).map(|k| (3 * (k % 48) + 2 * (k / 48)) as u8).collect();
+        let view = ColourView::new(&bytes, 48, 32, 48, PixelFormat::Grey8).expect("a view");
+        pyramid.fill(&view, &LuminanceTable::new(&InverseResponse::linear()));
+        for (level, image) in pyramid.levels.iter().enumerate() {
+            // A ramp is linear in the image, so its block mean is its value at the block's centre.
+            for (k, light) in image.pixels.iter().enumerate() {
+                let fine = |x: usize| PinholeCamera::pixel_at_level(x as f32, level, 0);
+                let expected = (3.0 * fine(k % image.width) + 2.0 * fine(k / image.width)) / 255.0;
+                assert!((light - expected).abs() < 1e-6, "level {level}, pixel {k}: {light} not {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_point_keeps_its_ray_on_every_level() {
+        for level in 0..4 {
+            let coarse = CAMERA.at_level(level);
+            let at = |x: f32| f64::from(PinholeCamera::pixel_at_level(x, 0, level));
+            let difference = coarse.ray(at(7.0), at(21.0)) - CAMERA.ray(7.0, 21.0);
+            assert!(difference.norm() < 1e-7, "level {level}: {difference:?}");
+        }
+    }
+
+    #[test]
+    fn colour_rows_may_be_padded() {
+        let mut memory = vec![0; GreyPyramid::bytes(2, 2, 1) + 64];
+        let camera = PinholeCamera { width: 2, height: 2, ..CAMERA };
+        let mut pyramid = GreyPyramid::carve(&mut Arena::new(&mut memory), &camera, 1).expect("memory");
+        let bytes = [255, 255, 255, 0, 0, 0, 9, 9, 0, 255, 0, 255, 0, 0];
+        let view = ColourView::new(&bytes, 2, 2, 8, PixelFormat::Rgb8).expect("a view");
+        pyramid.fill(&view, &LuminanceTable::new(&InverseResponse::linear()));
+        for (light, expected) in pyramid.levels[0].pixels.iter().zip([1.0, 0.0, 0.7152, 0.2126]) {
+            assert!((light - expected).abs() < 1e-6);
+        }
+    }
+}

@@ -96,3 +96,98 @@ fn strongest(
     }
     best.map(|(u, v)| (u, v, sqrt_f32(best_squared)))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::*;
+
+    const SIZE: (usize, usize) = (96, 64);
+    const SETTINGS: SelectionSettings = SelectionSettings {
+        cell: 12,
+        min_strength: 0.02,
+        dark_intensity: 0.02,
+        region: PixelRectangle { left: 8, top: 4, right: 90, bottom: 60 },
+    };
+
+    fn textured() -> Vec<f32> {
+        let light = |u: f32, v: f32| 0.4 + 0.2 * (0.7 * u + 0.2 * v).sin() + 0.1 * (0.5 * v - 0.3 * u).cos();
+        (0..SIZE.0 * SIZE.1).map(|k| light((k % SIZE.0) as f32, (k / SIZE.0) as f32)).collect()
+    }
+
+    /// Keypoints of an image whose planes are on level 1, missing where `hole` says so.
+    fn selected(image: &[f32], hole: impl Fn(usize, usize) -> bool, capacity: usize) -> Vec<Keypoint> {
+        let (width, height) = (SIZE.0 / 2, SIZE.1 / 2);
+        let mut value: Vec<f32> = (0..width * height)
+            .map(|k| if hole(k % width, k / width) { 0.0 } else { 0.3 + 0.001 * (k % width) as f32 })
+            .collect();
+        let (mut slope_u, mut slope_v) = (vec![0.001; width * height], vec![0.0; width * height]);
+        let planes =
+            SurfacePlanes { value: &mut value, slope_u: &mut slope_u, slope_v: &mut slope_v, width, height };
+        let image = LevelImage { pixels: image, width: SIZE.0, height: SIZE.1 };
+        let mut keypoints = vec![Keypoint::default(); capacity];
+        let count = select_keypoints(&image, 0, &planes, 1, &SETTINGS, &mut keypoints);
+        keypoints.truncate(count);
+        keypoints
+    }
+
+    /// The grid cell of a keypoint; the grid starts a patch radius and a pixel inside of the region.
+    fn cell_of(keypoint: &Keypoint) -> (usize, usize) {
+        let margin = PATTERN_RADIUS + 1;
+        let cell = |x: f32, first: usize| (x as usize - first - margin) / SETTINGS.cell;
+        (cell(keypoint.u, SETTINGS.region.left), cell(keypoint.v, SETTINGS.region.top))
+    }
+
+    #[test]
+    fn one_per_cell_inside_of_the_region_with_the_depth_of_the_plane() {
+        let keypoints = selected(&textured(), |_, _| false, 100);
+        let mut cells: Vec<_> = keypoints.iter().map(cell_of).collect();
+        let count = cells.len();
+        assert!(count >= 20, "only {count} of 24 cells have a keypoint");
+        cells.sort_unstable();
+        cells.dedup();
+        assert_eq!(cells.len(), count, "a cell has two keypoints");
+        for k in &keypoints {
+            let margin = PATTERN_RADIUS as f32;
+            assert!(k.u - margin >= 8.0 && k.v - margin >= 4.0 && k.u + margin < 90.0 && k.v + margin < 60.0);
+            let expected = 0.3 + 0.001 * ((k.u + 0.5) / 2.0 - 0.5);
+            assert!((k.inverse_depth - expected).abs() < 1e-6);
+            assert!(k.strength > SETTINGS.min_strength);
+        }
+        assert_eq!(keypoints, selected(&textured(), |_, _| false, 100), "not deterministic");
+    }
+
+    #[test]
+    fn the_strongest_gradient_of_the_cell_wins() {
+        let mut image = vec![0.5; SIZE.0 * SIZE.1];
+        for v in 0..SIZE.1 {
+            image[v * SIZE.0 + 40..(v + 1) * SIZE.0].fill(0.6);
+            image[v * SIZE.0 + 43..(v + 1) * SIZE.0].fill(0.9);
+        }
+        let keypoints = selected(&image, |_, _| false, 100);
+        assert!(!keypoints.is_empty());
+        // The larger of two steps is between columns 42 and 43; the darker side has the larger whitened gradient.
+        assert!(keypoints.iter().all(|k| k.u == 42.0), "{keypoints:?}");
+        let expected = 0.15 / (0.6f32 + SETTINGS.dark_intensity).sqrt();
+        assert!((keypoints[0].strength - expected).abs() < 1e-5);
+    }
+
+    #[test]
+    fn nothing_on_holes_and_nothing_without_texture() {
+        let hole = |u: usize, _: usize| (10..30).contains(&u);
+        for k in selected(&textured(), hole, 100) {
+            assert!(!(19.5..59.5).contains(&k.u), "keypoint on a hole at column {}", k.u);
+        }
+        assert!(selected(&vec![0.5; SIZE.0 * SIZE.1], |_, _| false, 100).is_empty());
+        assert!(selected(&textured(), |_, _| true, 100).is_empty());
+    }
+
+    #[test]
+    fn the_capacity_bounds_the_number() {
+        let all = selected(&textured(), |_, _| false, 100);
+        assert_eq!(selected(&textured(), |_, _| false, 7), all[..7]);
+        assert!(selected(&textured(), |_, _| false, 0).is_empty());
+    }
+}

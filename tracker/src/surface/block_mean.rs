@@ -112,3 +112,73 @@ fn block_inverse_depth(raw: &DepthView, u: usize, v: usize, block: usize, metres
     let (high, low) = (per_metre / f32::from(nearest), per_metre / f32::from(farthest));
     if high - low > spread_limit(low) { 0.0 } else { sum * per_metre / count as f32 }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::*;
+
+    const CAMERA: PinholeCamera =
+        PinholeCamera { width: 32, height: 24, fx: 30.0, fy: 30.0, cx: 15.5, cy: 11.5 };
+
+    /// The map on `level` of depth `metres(u, v)` in units of 0.1 mm.
+    fn filled(level: usize, metres: impl Fn(usize, usize) -> f64) -> (Vec<f32>, f32) {
+        let raw: Vec<u16> = (0..32 * 24).map(|k| (metres(k % 32, k / 32) * 1e4).round() as u16).collect();
+        let mut memory = vec![0; 32 * 24 * 4 + 128];
+        let mut map = InverseDepthMap::carve(&mut Arena::new(&mut memory), &CAMERA, level).expect("memory");
+        let share = map.fill(&DepthView::new(&raw, 32, 24, 32).expect("a view"), 1e-4);
+        (map.values.to_vec(), share)
+    }
+
+    #[test]
+    fn blocks_of_a_plane_hold_its_inverse_depth_at_their_centre() {
+        let plane = |u: f64, v: f64| 0.5 + 0.001 * u - 0.002 * v;
+        let (values, share) = filled(2, |u, v| 1.0 / plane(u as f64, v as f64));
+        assert_eq!(share, 1.0);
+        for (k, rho) in values.iter().enumerate() {
+            let expected = plane(4.0 * (k % 8) as f64 + 1.5, 4.0 * (k / 8) as f64 + 1.5);
+            // Rounding to 0.1 mm at 2 m is 1e-5 1/m and averages out.
+            assert!((f64::from(*rho) - expected).abs() < 1e-5, "block {k}: {rho} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn blocks_need_half_of_their_pixels() {
+        let (half, share) = filled(1, |u, _| if u % 2 == 0 { 2.0 } else { 0.0 });
+        assert!(half.iter().all(|rho| (rho - 0.5).abs() < 1e-6), "the mean is over measured pixels only");
+        assert_eq!(share, 1.0);
+        let (less, share) = filled(1, |u, v| if u % 2 == 0 && v % 2 == 0 { 2.0 } else { 0.0 });
+        assert!(less.iter().all(|rho| *rho == 0.0));
+        assert_eq!(share, 0.0);
+    }
+
+    #[test]
+    fn blocks_across_a_depth_edge_are_missing() {
+        // The edge at column 6 cuts the second block of every row of blocks.
+        let (values, _) = filled(2, |u, _| if u < 6 { 1.0 } else { 2.0 });
+        for row in values.chunks_exact(8) {
+            assert!((row[0] - 1.0).abs() < 1e-6 && (row[2] - 0.5).abs() < 1e-6);
+            assert_eq!(row[1], 0.0);
+        }
+    }
+
+    #[test]
+    fn sampling_is_linear_on_a_surface_and_refuses_edges_holes_and_the_outside() {
+        let mut values: Vec<f32> =
+            (0..48).map(|k| 0.5 + 0.002 * (k % 8) as f32 - 0.001 * (k / 8) as f32).collect();
+        values[2 * 8 + 5] = 0.0;
+        values[4 * 8 + 2] = 0.9;
+        let map = InverseDepthMap { values: &mut values, width: 8, height: 6, level: 0 };
+        let rho = map.sample(1.25, 0.5).expect("inside of the surface");
+        assert!((rho - (0.5 + 0.002 * 1.25 - 0.0005)).abs() < 1e-7);
+        assert_eq!(map.sample(4.5, 1.5), None, "hole");
+        assert_eq!(map.sample(1.5, 3.5), None, "depth edge");
+        for (u, v) in
+            [(-0.01, 1.0), (1.0, -0.01), (7.0, 1.0), (1.0, 5.0), (f32::NAN, 1.0), (1.0, f32::INFINITY)]
+        {
+            assert_eq!(map.sample(u, v), None, "({u}, {v})");
+        }
+    }
+}

@@ -135,3 +135,81 @@ fn solve_plane(s: &[f32; 6], t: &[f32; 3]) -> Option<Plane> {
     let value = (t[0] - slope_u * s[1] - slope_v * s[2]) * inverse_count;
     Some(Plane { value, slope_u, slope_v })
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+
+    use super::*;
+
+    const CAMERA: PinholeCamera =
+        PinholeCamera { width: 16, height: 12, fx: 15.0, fy: 15.0, cx: 7.5, cy: 5.5 };
+
+    fn check_fit(rho: impl Fn(usize, usize) -> f32, check: impl Fn(usize, usize, &SurfacePlanes)) {
+        let mut memory = vec![0; 4 * (16 * 12 * 4 + 64) + 64];
+        let mut arena = Arena::new(&mut memory);
+        let map = InverseDepthMap::carve(&mut arena, &CAMERA, 0).expect("memory");
+        for (k, value) in map.values.iter_mut().enumerate() {
+            *value = rho(k % 16, k / 16);
+        }
+        let mut planes = SurfacePlanes::carve(&mut arena, &CAMERA, 0).expect("memory");
+        planes.fit(&map);
+        (0..16 * 12).for_each(|k| check(k % 16, k / 16, &planes));
+    }
+
+    #[test]
+    fn an_exact_plane_is_recovered_despite_holes() {
+        let rho = |u: usize, v: usize| 0.6 + 0.003 * u as f32 - 0.002 * v as f32;
+        let holes = |u: usize, v: usize| (3 * u + 5 * v) % 7 == 0;
+        check_fit(
+            |u, v| if holes(u, v) { 0.0 } else { rho(u, v) },
+            |u, v, planes| {
+                let k = v * 16 + u;
+                if holes(u, v) {
+                    assert_eq!(planes.value[k], 0.0, "a hole has no plane");
+                } else if (2..14).contains(&u) && (2..10).contains(&v) {
+                    assert!((planes.value[k] - rho(u, v)).abs() < 1e-6);
+                    assert!((planes.slope_u[k] - 0.003).abs() < 1e-6);
+                    assert!((planes.slope_v[k] + 0.002).abs() < 1e-6);
+                }
+            },
+        );
+    }
+
+    #[test]
+    fn planes_on_both_sides_of_a_step_ignore_the_other_side() {
+        let rho = |u: usize, _: usize| if u < 8 { 0.4 + 0.004 * u as f32 } else { 0.9 - 0.002 * u as f32 };
+        check_fit(rho, |u, v, planes| {
+            if (2..10).contains(&v) && (2..14).contains(&u) && planes.value[v * 16 + u] > 0.0 {
+                let slope = if u < 8 { 0.004 } else { -0.002 };
+                assert!((planes.slope_u[v * 16 + u] - slope).abs() < 1e-6, "slope at column {u}");
+                assert!(planes.slope_v[v * 16 + u].abs() < 1e-6);
+            }
+        });
+    }
+
+    #[test]
+    fn planes_continue_to_the_next_pixel_border_and_no_farther() {
+        check_fit(
+            |u, v| 0.5 + 0.01 * u as f32 + 0.001 * v as f32,
+            |u, v, planes| {
+                if u > 2 && u < 13 && v > 2 && v < 9 {
+                    let (x, y) = (u as f32 + 0.4, v as f32 - 0.3);
+                    let rho = planes.inverse_depth(x, y).expect("a plane");
+                    assert!((rho - (0.5 + 0.01 * x + 0.001 * y)).abs() < 1e-6);
+                }
+                for (x, y) in [(-0.6, 3.0), (3.0, 11.6), (15.6, 3.0), (f32::NAN, 3.0)] {
+                    assert_eq!(planes.inverse_depth(x, y), None);
+                }
+            },
+        );
+    }
+
+    #[test]
+    fn isolated_measurements_have_no_plane() {
+        check_fit(
+            |u, v| if u % 2 == 0 && v % 2 == 0 { 0.5 } else { 0.0 },
+            |u, v, planes| assert_eq!(planes.value[v * 16 + u], 0.0),
+        );
+    }
+}

@@ -84,6 +84,8 @@ impl TrackerConfig {
             ("fy", c.fy, c.fy > 1.0 && c.fy < 1e5, "1 to 100000 pixels"),
             ("cx", c.cx, c.cx.abs() < 1e5, "a pixel column"),
             ("cy", c.cy, c.cy.abs() < 1e5, "a pixel row"),
+            ("region", self.region.right as f64, self.region.right <= c.width, "columns of the image"),
+            ("region", self.region.bottom as f64, self.region.bottom <= c.height, "rows of the image"),
             ("metres_per_unit", scale, scale > 0.0 && scale < 1.0, "above 0 and below 1 metre"),
             ("levels", self.levels as f64, (2..=MAX_LEVELS).contains(&self.levels), "2 to 6"),
             ("levels", self.levels as f64, smallest >= 16, "at least 16 pixels on the coarsest level"),

@@ -90,3 +90,62 @@ fn rotated(a_from_b: &RigidTransform, rate: &Vector6<f64>) -> Vector6<f64> {
     rotated.fixed_rows_mut::<3>(0).copy_from(&translation);
     rotated
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: PinholeCamera =
+        PinholeCamera { width: 640, height: 480, fx: 500.0, fy: 500.0, cx: 319.5, cy: 239.5 };
+    const DT: f64 = 1.0 / 30.0;
+
+    /// Position of a camera that moves with constant acceleration, and its velocity.
+    fn quadratic(t: f64) -> (Vector6<f64>, Vector6<f64>) {
+        let (velocity, acceleration) =
+            (Vector6::new(0.4, -0.2, 0.1, 0.0, 0.0, 0.3), Vector6::new(-3.0, 5.0, 1.0, 0.0, 0.0, -2.0));
+        (velocity * t + acceleration * (0.5 * t * t), velocity + acceleration * t)
+    }
+
+    fn pose(t: f64) -> RigidTransform {
+        // Rotation about one axis only: rotation vectors then add up.
+        RigidTransform::identity().perturbed(&quadratic(t).0)
+    }
+
+    fn motion(t: f64) -> Motion {
+        Motion { within_exposure: Some(quadratic(t).1), ..Motion::still(t, 0.01, pose(t)) }
+    }
+
+    #[test]
+    fn constant_acceleration_is_predicted_exactly() {
+        let prior = motion(0.2).expected_motion(&pose(0.2 + DT), 0.2 + DT, 0.015, &CAMERA, 0.5);
+        let error = prior.expected - quadratic(0.2 + DT).1 * 0.015;
+        assert!(error.norm() < 1e-12, "{error:?}");
+    }
+
+    #[test]
+    fn the_prior_does_not_depend_on_the_reference_frame() {
+        let other = RigidTransform::identity().perturbed(&Vector6::new(1.0, 2.0, 3.0, 0.3, -0.2, 0.9));
+        let here = motion(0.2).expected_motion(&pose(0.2 + DT), 0.2 + DT, 0.015, &CAMERA, 0.5);
+        let mid = other.compose(&pose(0.2 + DT));
+        let there = motion(0.2).seen_from(&other).expected_motion(&mid, 0.2 + DT, 0.015, &CAMERA, 0.5);
+        assert!((rotated(&other, &here.expected) - there.expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn extrapolation_continues_the_rate_but_not_across_a_gap() {
+        let rate = Vector6::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.0);
+        let ahead = motion(0.0).extrapolate(&rate, 0.1);
+        assert!((pose(0.0).tangent_to(&ahead) - rate * 0.1).norm() < 1e-12);
+        assert_eq!(motion(0.0).extrapolate(&rate, 2.0 * MAX_GAP), pose(0.0));
+    }
+
+    #[test]
+    fn a_camera_at_rest_is_expected_to_stay_within_half_a_pixel() {
+        let still = Motion::still(0.0, 0.01, RigidTransform::identity());
+        let prior = still.expected_motion(&RigidTransform::identity(), DT, 0.01, &CAMERA, 0.5);
+        assert_eq!(prior.expected, Vector6::zeros());
+        // Half a pixel is 0.5/500 rad, and twice that in metres at 2 m.
+        assert!((prior.information[3] - 1e6).abs() < 1e-3);
+        assert!((prior.information[0] - 0.25e6).abs() < 1e-3);
+    }
+}

@@ -126,7 +126,7 @@ impl<'m> Tracker<'m> {
         self.keyframe.restart_surface();
         self.select_keypoints();
         self.brightness = BrightnessModel::default();
-        if self.motion.is_none() && self.last_timestamp.is_finite() {
+        if self.motion.is_none() {
             self.motion = Some(Motion::still(self.last_timestamp, 0.0, view.world_from_camera));
         }
         Ok(())

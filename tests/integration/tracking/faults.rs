@@ -1,0 +1,96 @@
+//! Camera faults in the middle of a sequence: no panic, the right status, and no trace afterwards.
+
+use mba_tests::handheld::{RenderedFrame, camera_of_width, pose_error, track_anew, tracker_config};
+use mba_tracker::{FrameResult, FrameStatus};
+
+use crate::scenes::{SMALL, elsewhere};
+
+/// Replaces frame 6 of the small sequence and tracks it all.
+fn with_fault(fault: impl Fn(&RenderedFrame) -> RenderedFrame) -> Vec<FrameResult> {
+    let mut frames = SMALL[..12].to_vec();
+    frames[6] = fault(&frames[6]);
+    let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+    for (result, frame) in results.iter().zip(&frames) {
+        assert!(result.world_from_camera.mid().is_valid(), "frame {}", result.index);
+        if result.index != 6 {
+            let (metres, _) = pose_error(result, frame, &frames[0]);
+            assert_ne!(result.status, FrameStatus::Lost, "frame {}", result.index);
+            assert!(metres < 0.003, "frame {}: {metres} m after the fault", result.index);
+        }
+    }
+    results
+}
+
+/// Lost, and the pose is that of the middle of the frame before.
+fn assert_held(results: &[FrameResult]) {
+    assert_eq!(results[6].status, FrameStatus::Lost);
+    assert_eq!(results[6].world_from_camera.start, results[5].world_from_camera.mid());
+    assert_eq!(results[6].world_from_camera.end, results[6].world_from_camera.start);
+    assert!(!results[6].is_keyframe);
+}
+
+#[test]
+fn a_black_frame_without_depth_holds_the_pose() {
+    assert_held(&with_fault(|frame| frame.replaced(|_| 0, |_, _| 0)));
+}
+
+#[test]
+fn a_saturated_frame_without_depth_holds_the_pose() {
+    assert_held(&with_fault(|frame| frame.replaced(|_| 255, |_, _| 0)));
+}
+
+#[test]
+fn a_view_of_another_place_holds_the_pose() {
+    assert_held(&with_fault(|_| elsewhere(6)));
+}
+
+#[test]
+fn depth_alone_carries_a_black_frame() {
+    let results = with_fault(|frame| frame.replaced(|_| 0, |_, z| z));
+    let (metres, _) = pose_error(&results[6], &SMALL[6], &SMALL[0]);
+    assert!(results[6].status == FrameStatus::Lost || metres < 0.005, "{metres} m");
+}
+
+#[test]
+fn the_image_alone_carries_a_frame_without_depth() {
+    let results = with_fault(|frame| frame.replaced(|grey| grey, |_, _| 0));
+    assert_ne!(results[6].status, FrameStatus::Lost);
+    let (metres, _) = pose_error(&results[6], &SMALL[6], &SMALL[0]);
+    assert!(metres < 0.005, "{metres} m");
+    assert_eq!(results[6].depth_residual, 0.0);
+}
+
+#[test]
+fn half_of_the_depth_is_enough() {
+    let results = with_fault(|frame| frame.replaced(|grey| grey, |k, z| if k % 160 < 80 { 0 } else { z }));
+    let (metres, _) = pose_error(&results[6], &SMALL[6], &SMALL[0]);
+    assert_eq!(results[6].status, FrameStatus::Ok);
+    assert!(metres < 0.002, "{metres} m");
+}
+
+#[test]
+fn dropped_frames_are_bridged() {
+    for gap in [2, 4] {
+        let mut frames = SMALL[..6].to_vec();
+        frames.extend_from_slice(&SMALL[6 + gap..12 + gap]);
+        let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+        for (result, frame) in results.iter().zip(&frames) {
+            let (metres, _) = pose_error(result, frame, &frames[0]);
+            assert!(result.status != FrameStatus::Lost && metres < 0.003, "gap {gap}: {metres} m");
+        }
+    }
+}
+
+#[test]
+fn useless_frames_at_the_start_are_skipped() {
+    let mut frames = SMALL[..8].to_vec();
+    frames[0] = frames[0].replaced(|_| 0, |_, z| z);
+    frames[1] = frames[1].replaced(|grey| grey, |_, _| 0);
+    let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+    assert_eq!((results[0].status, results[1].status), (FrameStatus::Lost, FrameStatus::Lost));
+    assert!(results[2].is_keyframe && results[2].status == FrameStatus::Ok);
+    for (result, frame) in results.iter().zip(&frames).skip(2) {
+        let (metres, _) = pose_error(result, frame, &frames[2]);
+        assert!(result.status == FrameStatus::Ok && metres < 0.002, "{metres} m");
+    }
+}

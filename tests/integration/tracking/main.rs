@@ -1,0 +1,10 @@
+//! The tracker as a whole, on short rendered sequences.
+
+mod bad_input;
+mod faults;
+mod memory;
+mod noise;
+mod recovery;
+mod reference_view;
+mod scenes;
+mod sequences;

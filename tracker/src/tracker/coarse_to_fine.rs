@@ -12,6 +12,9 @@ use crate::transfer::BrightnessModel;
 /// Levels on which several first guesses compete.
 const COMPETING_LEVELS: usize = 2;
 
+/// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
+const MIN_AGREEING: f64 = 0.05;
+
 /// Steps below this many pixels of a competing level are left to the finer ones.
 const COMPETING_MIN_STEP: f64 = 0.1;
 
@@ -92,7 +95,7 @@ impl FrameTask<'_> {
                 outcome = self.level(level, start, scratch);
                 iterations += outcome.iterations;
             }
-            let score = score(&outcome);
+            let score = score(&outcome, self.alignment.reference.keypoints[last_competing].len());
             if best.as_ref().is_none_or(|(best_score, _)| score < *best_score) {
                 best = Some((score, outcome));
             }
@@ -146,14 +149,12 @@ impl FrameTask<'_> {
     }
 }
 
-/// How badly a guess ended: photometric residual, raised by patches that disagree and by depth that does not fit.
-fn score(outcome: &LevelOutcome) -> f64 {
-    if outcome.patches_in_view == 0 {
-        return f64::MAX;
-    }
-    let disagreeing = 1.0 - outcome.patches as f64 / outcome.patches_in_view as f64;
+/// How badly a guess ended, where the reference has `keypoints` on the level: photometric residual, raised by patches
+/// that disagree or left the view and by depth that does not fit.
+fn score(outcome: &LevelOutcome, keypoints: usize) -> f64 {
+    let agreeing = outcome.patches as f64 / keypoints.max(1) as f64;
     let depth = 1.0 + 100.0 * f64::from(outcome.depth_scale);
-    f64::from(outcome.photometric_scale) * (1.0 + disagreeing) * depth
+    if agreeing < MIN_AGREEING { f64::MAX } else { f64::from(outcome.photometric_scale) * depth / agreeing }
 }
 
 /// The estimate or its reverse, whichever moves in the expected direction: a blurred image alone cannot tell.

@@ -142,8 +142,8 @@ fn an_output_that_cannot_be_created_is_refused_before_the_work() {
     fs::write(place.path("run"), "a file").unwrap();
     place.track().assert_error(2, &["cannot write", "run"]);
     let below_a_file = place.path("run/data");
-    mba([Path::new("synth"), Path::new("--size"), Path::new("64x48"), Path::new("--out"), &below_a_file])
-        .assert_error(2, &["cannot write", "run/data"]);
+    let options = ["synth", "--size", "64x48", "--blur", "1", "--out"].map(Path::new);
+    mba(options.into_iter().chain([below_a_file.as_path()])).assert_error(2, &["cannot write", "run/data"]);
 }
 
 #[test]

@@ -111,7 +111,7 @@ impl<'m> Keyframe<'m> {
     }
 
     /// Averages in the depth map of a frame at `keyframe_from_camera`; `camera` is that of the depth maps. Planes
-    /// and keypoint depths follow whenever the number of frames has doubled.
+    /// and keypoint depths follow whenever the number of frames has doubled, from two on.
     pub fn fuse_depth(
         &mut self,
         current: &InverseDepthMap,
@@ -120,7 +120,7 @@ impl<'m> Keyframe<'m> {
     ) {
         fuse_depth(&mut self.depth, self.weights, current, keyframe_from_camera, camera);
         self.fusions += 1;
-        if self.fusions.is_power_of_two() {
+        if self.fusions > 1 && self.fusions.is_power_of_two() {
             self.planes.fit(&self.depth);
             for (level, keypoints) in self.keypoints.iter_mut().enumerate() {
                 let at = |x: f32| PinholeCamera::pixel_at_level(x, level, self.depth.level);

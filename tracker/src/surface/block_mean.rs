@@ -56,6 +56,17 @@ impl<'m> InverseDepthMap<'m> {
         measured as f32 / (self.width * self.height).max(1) as f32
     }
 
+    /// Mean of the measured values, 1/m; `None` if there is none.
+    #[must_use]
+    pub fn mean(&self) -> Option<f32> {
+        let (sum, count) = self
+            .values
+            .iter()
+            .filter(|&&rho| rho > 0.0)
+            .fold((0.0f64, 0usize), |(s, n), &rho| (s + f64::from(rho), n + 1));
+        (count > 0).then(|| (sum / count as f64) as f32)
+    }
+
     /// Bilinear inverse depth at `(u, v)` of this level, or `None` where a neighbour is missing, outside, or on
     /// another surface.
     #[inline]

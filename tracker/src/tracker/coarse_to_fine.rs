@@ -1,7 +1,7 @@
 //! The order in which levels and first guesses are tried.
 
 use arrayvec::ArrayVec;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use super::history::Motion;
 use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, MotionPrior};
@@ -12,14 +12,17 @@ use crate::transfer::BrightnessModel;
 /// Levels on which several first guesses compete.
 const COMPETING_LEVELS: usize = 2;
 
-/// A guess this much worse than what recent frames ended with is not trusted alone.
-const TRUSTED_SCORE_RATIO: f64 = 1.25;
+/// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
+const MIN_AGREEING: f64 = 0.05;
 
 /// Steps below this many pixels of a competing level are left to the finer ones.
 const COMPETING_MIN_STEP: f64 = 0.1;
 
 /// Upper bound of first guesses.
-const MAX_GUESSES: usize = 6;
+const MAX_GUESSES: usize = 16;
+
+/// When the motion is unknown, turns by this many pixels of the coarsest level are tried in eight directions.
+const SEARCH_PIXELS: f64 = 3.0;
 
 /// One frame to be aligned with one reference.
 #[derive(Clone, Copy, Debug)]
@@ -36,8 +39,6 @@ pub(super) struct FrameTask<'a> {
     pub(super) blur: bool,
     /// Typical inverse depth of the scene, 1/m.
     pub(super) inverse_depth: f64,
-    /// Score that recent frames ended the competing levels with; infinite if any is fine.
-    pub(super) trusted_score: f64,
 }
 
 /// A finished alignment.
@@ -47,8 +48,6 @@ pub(super) struct Aligned {
     pub(super) outcome: LevelOutcome,
     /// Linearisations on all levels.
     pub(super) iterations: usize,
-    /// Score after the competing levels: lower is better.
-    pub(super) score: f64,
 }
 
 impl FrameTask<'_> {
@@ -63,16 +62,26 @@ impl FrameTask<'_> {
             guesses.push(self.motion.extrapolate(&rate, dt));
         }
         guesses.push(self.motion.extrapolate(&steady, dt));
-        if let Some(rate) = self.motion.within_exposure {
-            guesses.push(self.motion.extrapolate(&rate, dt));
+        match self.motion.within_exposure {
+            Some(rate) => guesses.push(self.motion.extrapolate(&rate, dt)),
+            None => guesses.extend(self.turns()),
         }
         guesses.push(self.motion.reference_from_mid);
         guesses.push(self.motion.extrapolate(&-steady, dt));
         guesses
     }
 
-    /// Aligns coarse to fine. The guesses compete on the coarsest levels, one after the other until one ends as
-    /// well as recent frames did; the best goes on alone.
+    /// The last pose turned up, down, sideways and diagonally.
+    fn turns(&self) -> impl Iterator<Item = RigidTransform> {
+        let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
+        let angle = SEARCH_PIXELS / self.alignment.camera.at_level(coarsest).fx;
+        let last = self.motion.reference_from_mid;
+        let directions = (0..9).filter(|k| *k != 4).map(|k| (f64::from(k % 3) - 1.0, f64::from(k / 3) - 1.0));
+        directions.map(move |(x, y)| last.perturbed(&Vector6::new(0.0, 0.0, 0.0, x * angle, y * angle, 0.0)))
+    }
+
+    /// Aligns coarse to fine. The guesses compete on the coarsest levels, where an iteration costs next to nothing;
+    /// the best goes on alone.
     pub(super) fn run(&self, guesses: &[RigidTransform], scratch: &mut AlignScratch) -> Aligned {
         let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
@@ -86,24 +95,22 @@ impl FrameTask<'_> {
                 outcome = self.level(level, start, scratch);
                 iterations += outcome.iterations;
             }
-            let score = score(&outcome);
+            let score = score(&outcome, self.alignment.reference.keypoints[last_competing].len());
             if best.as_ref().is_none_or(|(best_score, _)| score < *best_score) {
                 best = Some((score, outcome));
             }
-            if score < TRUSTED_SCORE_RATIO * self.trusted_score {
-                break;
-            }
         }
-        let (score, mut outcome) = best.unwrap_or_else(|| {
-            (f64::MAX, LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)))
-        });
+        let mut outcome = best.map_or_else(
+            || LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)),
+            |(_, outcome)| outcome,
+        );
         for level in (0..last_competing).rev() {
             let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
             outcome = self.level(level, start, scratch);
             iterations += outcome.iterations;
         }
         outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
-        Aligned { outcome, iterations, score }
+        Aligned { outcome, iterations }
     }
 
     fn level(&self, level: usize, start: Estimate, scratch: &mut AlignScratch) -> LevelOutcome {
@@ -142,14 +149,12 @@ impl FrameTask<'_> {
     }
 }
 
-/// How badly a guess ended: photometric residual, raised by patches that disagree and by depth that does not fit.
-fn score(outcome: &LevelOutcome) -> f64 {
-    if outcome.patches_in_view == 0 {
-        return f64::MAX;
-    }
-    let disagreeing = 1.0 - outcome.patches as f64 / outcome.patches_in_view as f64;
+/// How badly a guess ended, where the reference has `keypoints` on the level: photometric residual, raised by patches
+/// that disagree or left the view and by depth that does not fit.
+fn score(outcome: &LevelOutcome, keypoints: usize) -> f64 {
+    let agreeing = outcome.patches as f64 / keypoints.max(1) as f64;
     let depth = 1.0 + 100.0 * f64::from(outcome.depth_scale);
-    f64::from(outcome.photometric_scale) * (1.0 + disagreeing) * depth
+    if agreeing < MIN_AGREEING { f64::MAX } else { f64::from(outcome.photometric_scale) * depth / agreeing }
 }
 
 /// The estimate or its reverse, whichever moves in the expected direction: a blurred image alone cannot tell.

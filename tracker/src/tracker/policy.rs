@@ -23,29 +23,20 @@ pub(super) struct Evidence {
 }
 
 /// Running means of what good frames end with.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Typical {
     /// Photometric residual of the finest level.
     pub(super) residual: f32,
     /// Depth residual, 1/m.
     pub(super) depth_residual: f32,
-    /// Score after the competing levels.
-    pub(super) score: f64,
-}
-
-impl Default for Typical {
-    fn default() -> Self {
-        Self { residual: 0.0, depth_residual: 0.0, score: 0.0 }
-    }
 }
 
 impl Typical {
     /// Takes in a good frame.
-    pub(super) fn learn(&mut self, outcome: &LevelOutcome, score: f64) {
+    pub(super) fn learn(&mut self, outcome: &LevelOutcome) {
         let share = if self.residual == 0.0 { 1.0 } else { 0.2 };
-        self.residual += share as f32 * (outcome.photometric_scale - self.residual);
-        self.depth_residual += share as f32 * (outcome.depth_scale - self.depth_residual);
-        self.score += share * (score - self.score);
+        self.residual += share * (outcome.photometric_scale - self.residual);
+        self.depth_residual += share * (outcome.depth_scale - self.depth_residual);
     }
 }
 

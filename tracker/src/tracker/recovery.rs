@@ -100,7 +100,6 @@ impl<'m> RecentKeyframes<'m> {
                 brightness: BrightnessModel::default(),
                 blur: false,
                 inverse_depth: typical_inverse_depth(finest),
-                trusted_score: 0.0,
             };
             let guesses = [local.reference_from_mid, RigidTransform::identity()];
             let outcome = task.run(&guesses, scratch).outcome;

@@ -51,7 +51,6 @@ pub struct Tracker<'m> {
     brightness: BrightnessModel,
     typical: Typical,
     last_timestamp: f64,
-    lost_frames: usize,
     frames: usize,
 }
 
@@ -84,7 +83,6 @@ impl<'m> Tracker<'m> {
             brightness: BrightnessModel::default(),
             typical: Typical::default(),
             last_timestamp: f64::NEG_INFINITY,
-            lost_frames: 0,
             frames: 0,
         })
     }
@@ -141,7 +139,6 @@ impl<'m> Tracker<'m> {
         self.brightness = BrightnessModel::default();
         self.typical = Typical::default();
         self.last_timestamp = f64::NEG_INFINITY;
-        self.lost_frames = 0;
         self.frames = 0;
     }
 
@@ -280,7 +277,6 @@ impl<'m> Tracker<'m> {
             brightness: self.brightness,
             blur,
             inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),
-            trusted_score: self.typical.score,
         };
         match start {
             Some(mid) => task.run(&[mid], &mut self.scratch),
@@ -339,9 +335,8 @@ impl<'m> Tracker<'m> {
                 .then(|| world_from_camera.motion() / frame.exposure),
         });
         self.brightness = outcome.estimate.brightness;
-        self.lost_frames = 0;
         if status == FrameStatus::Ok {
-            self.typical.learn(outcome, aligned.score);
+            self.typical.learn(outcome);
         }
         let wanted = wants_keyframe(&evidence, self.keyframe.blur, self.config.camera.width);
         if status == FrameStatus::Ok && wanted {
@@ -359,7 +354,6 @@ impl<'m> Tracker<'m> {
 
     /// Holds the last good pose.
     fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned) -> FrameResult {
-        self.lost_frames += 1;
         let held = Motion { between_frames: motion.between_frames * 0.5, within_exposure: None, ..*motion };
         self.motion = Some(held);
         let world_from_camera = ExposureTrajectory::still(motion.reference_from_mid);
@@ -434,7 +428,7 @@ impl<'m> Tracker<'m> {
         if self.config.reference == ReferenceMode::Raw || !worth {
             return false;
         }
-        let typical = typical_inverse_depth(self.keyframe.finest_keypoints()) as f32;
+        let Some(typical) = self.keyframe.depth.mean() else { return false };
         let longest = self.deblur.flow.fill(
             &exposure,
             &self.config.camera,

@@ -194,7 +194,9 @@ impl<'m> Tracker<'m> {
             let start = self.motion.unwrap_or(*motion);
             aligned = self.align(frame, &start, self.config.align.blur, None);
             status = match self.judge(&aligned.outcome, &start, frame) {
-                FrameStatus::Lost => FrameStatus::Lost,
+                FrameStatus::Lost => {
+                    return self.resume(frame, &start.reference_from_mid, aligned.iterations);
+                }
                 _ => FrameStatus::Weak,
             };
         }
@@ -203,6 +205,23 @@ impl<'m> Tracker<'m> {
             _ => self.accept(frame, motion, &aligned, status),
         };
         result.revision = revision;
+        result
+    }
+
+    /// Goes on from a view that was found again near an older keyframe, out of sight of the current one: the frame
+    /// becomes the keyframe, and like that of the very first one its motion is learnt from the next frame.
+    fn resume(&mut self, frame: &Frame, world_from_mid: &RigidTransform, iterations: usize) -> FrameResult {
+        let still = ExposureTrajectory::still(*world_from_mid);
+        let nothing = LevelOutcome::unchanged(crate::align::Estimate {
+            keyframe_from_camera: still,
+            brightness: BrightnessModel::default(),
+        });
+        let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing, iterations);
+        self.keep_keyframe();
+        self.promote(world_from_mid, None, f32::MAX);
+        self.motion = Some(Motion::still(frame.timestamp, frame.exposure, *world_from_mid));
+        result.status = FrameStatus::Weak;
+        result.is_keyframe = true;
         result
     }
 

@@ -25,12 +25,12 @@ pub(crate) fn elsewhere(k: usize) -> RenderedFrame {
     still_frame(&PlaneScene::corner(77, 0.16), k, pose)
 }
 
-/// A sharp frame at the time of frame `k`.
+/// A sharp frame at the time of frame `k`: hardly any exposure time.
 pub(crate) fn still_frame(
     scene: &PlaneScene,
     k: usize,
     world_from_camera: mba_tracker::geometry::RigidTransform,
 ) -> RenderedFrame {
     let truth = mba_tracker::trajectory::ExposureTrajectory::still(world_from_camera);
-    RenderedFrame::new(scene, &camera_of_width(160), k as f64 / 30.0, EXPOSURE, truth)
+    RenderedFrame::new(scene, &camera_of_width(160), k as f64 / 30.0, 0.0, truth)
 }

@@ -70,8 +70,11 @@ fn buffers_that_are_too_short_are_refused() {
     assert!(DepthView::new(&raw, 11, 2, 10).is_err());
 }
 
+/// Whether an error is the expected one.
+type Expected = fn(&FrameError) -> bool;
+
 /// Frames that are refused, with what is expected of the error.
-fn refused(good: &Frame, previous: f64) -> Vec<(Frame<'static>, fn(&FrameError) -> bool)> {
+fn refused(good: &Frame, previous: f64) -> Vec<(Frame<'static>, Expected)> {
     let grey: &[u8] = vec![128; 320 * 240].leak();
     let raw: &[u16] = vec![10_000; 320 * 240].leak();
     let colour = |w, h| ColourView::new(grey, w, h, w, PixelFormat::Grey8).expect("a view");
@@ -85,8 +88,8 @@ fn refused(good: &Frame, previous: f64) -> Vec<(Frame<'static>, fn(&FrameError) 
     };
     let t = good.timestamp;
     let (c, d) = (colour(160, 120), depth(160, 120));
-    let timestamp: fn(&FrameError) -> bool = |e| matches!(e, FrameError::Timestamp { .. });
-    let exposure: fn(&FrameError) -> bool = |e| matches!(e, FrameError::Exposure { .. });
+    let timestamp: Expected = |e| matches!(e, FrameError::Timestamp { .. });
+    let exposure: Expected = |e| matches!(e, FrameError::Exposure { .. });
     vec![
         (frame(t, 0.02, colour(320, 240), d), |e| {
             *e == FrameError::Size { expected: (160, 120), got: (320, 240) }

@@ -114,6 +114,7 @@ fn frames_table(summary: &Summary) -> String {
         ["lost".to_owned(), counts.lost.to_string()],
         ["skipped (unreadable image)".to_owned(), counts.skipped.to_string()],
         ["keyframes".to_owned(), counts.keyframes.to_string()],
+        ["deblurred keyframes".to_owned(), summary.deblurred_keyframes.to_string()],
     ];
     card("Frames", &rows)
 }

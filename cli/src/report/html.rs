@@ -9,9 +9,9 @@ use super::table::percent;
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page.
+/// The whole page; `keyframes` is its section with pictures.
 #[must_use]
-pub(super) fn page(run: &Run, plots: &[Plot]) -> String {
+pub(super) fn page(run: &Run, plots: &[Plot], keyframes: &str) -> String {
     let summary = &run.summary;
     let title = escape(&data_set_name(summary));
     let charts: String =
@@ -37,7 +37,7 @@ pub(super) fn page(run: &Run, plots: &[Plot]) -> String {
 <header><h1>{title}</h1><p>{folder}</p></header>
 {notices}<section class="tiles">
 {tiles}</section>
-<h2>Charts</h2>
+{keyframes}<h2>Charts</h2>
 <section class="charts">
 {charts}</section>
 <h2>Figures</h2>

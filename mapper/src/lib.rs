@@ -1,6 +1,7 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
 pub mod dataset;
+pub mod deblurring;
 mod error;
 pub mod evaluation;
 pub mod run;

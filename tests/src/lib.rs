@@ -1,4 +1,5 @@
 //! Helpers shared by the whole-system tests.
 
+pub mod raster_golden;
 pub mod reference_values;
 pub mod transfer_scene;

@@ -1,0 +1,3 @@
+//! The Gaussian rasterizer against golden data, its oracle, finite differences and hostile input.
+
+mod reference;

@@ -3,6 +3,7 @@
 pub mod dataset;
 mod error;
 pub mod evaluation;
+pub mod gaussians;
 pub mod raster;
 pub mod run;
 mod text_lines;

@@ -47,9 +47,9 @@ fn gradients_are_the_golden_ones() {
 fn pose_gradients_are_the_golden_ones() {
     for scene in scenes() {
         let view = gradients_of(&scene).view;
-        let twelve = view.rotation.insert_column(3, 0.0).transpose();
-        let twelve =
-            twelve.iter().enumerate().map(|(k, &v)| if k % 4 == 3 { view.translation[k / 4] } else { v });
+        let twelve = (0..3).flat_map(|i| {
+            [view.rotation[(i, 0)], view.rotation[(i, 1)], view.rotation[(i, 2)], view.translation[i]]
+        });
         scene.assert_gradient("view", twelve, GRADIENT_TOLERANCE);
         let camera_from_world = scene.view().world_from_camera.inverse();
         let left = view.left_tangent(&camera_from_world);

@@ -12,6 +12,7 @@ use nalgebra::{Vector2, Vector3};
 pub use render::{gradients, render};
 
 use super::pose::ViewGradient;
+use crate::gaussians::Gaussian;
 
 /// One Gaussian in the parameters of the formulas.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,19 @@ pub struct ReferenceGaussian {
     pub opacity: f64,
     /// Linear RGB.
     pub colour: Vector3<f64>,
+}
+
+impl From<&Gaussian> for ReferenceGaussian {
+    fn from(gaussian: &Gaussian) -> Self {
+        let vector = |values: [f32; 3]| Vector3::from(values.map(f64::from));
+        Self {
+            mean: vector(gaussian.mean),
+            scale: vector(gaussian.log_scale).map(f64::exp),
+            rotation: gaussian.rotation.map(f64::from),
+            opacity: 1.0 / (1.0 + (-f64::from(gaussian.opacity_logit)).exp()),
+            colour: vector(gaussian.colour),
+        }
+    }
 }
 
 /// How the faintest parts of a splat are treated.

@@ -13,12 +13,13 @@ use fearless_simd::{Level, dispatch, f32x4, f32x8, prelude::*};
 
 use super::constants::{MAX_ALPHA, MIN_ALPHA};
 use super::falloff::BlockFalloff;
-use super::forward::TilePixels;
+use super::forward::{TilePixels, TileSplats};
 use super::project::Splat;
-use super::tile::{BLOCK_WIDTH, TILE_COLUMNS, TILE_HEIGHT, TileEntry};
+use super::tile::{BLOCK_WIDTH, TILE_COLUMNS, TILE_HEIGHT};
 
-/// Sums over the pixels of a tile for one splat, with `s` the gradient by the logarithm of alpha and `w` the
-/// weight: `s`, `s dx`, `s dy`, `s dx^2`, `s dx dy`, `s dy^2`, `w dL/dI` (three), `w dL/dD`; two unused.
+/// Sums over the pixels of a tile for one splat, with `s` the gradient by the logarithm of alpha, (u, v) the
+/// coordinates in which the splat is round, and `w` the weight: `s`, `s u`, `s v`, `s u^2`, `s u v`, `s v^2`,
+/// `w dL/dI` (three), `w dL/dD`; two unused.
 pub(super) type SplatSums = [f32; 12];
 
 /// What the backward pass keeps of one row of a block.
@@ -42,23 +43,22 @@ pub(super) type TileGradient = [[GradientRow; TILE_HEIGHT]; TILE_COLUMNS];
 /// Ten sums, one vector each.
 struct Sums<S: Simd>([f32x8<S>; 10]);
 
-/// Writes the sums of every splat of `list` to `sums`, which has its length. `gradient` holds the gradient by the
-/// pixels on entry and is used up.
+/// Writes the sums of every splat of the tile to `sums`, which has the length of its list. `gradient` holds the
+/// gradient by the pixels on entry and is used up.
 pub(super) fn backward(
     level: Level,
-    splats: &[Splat],
-    list: &[TileEntry],
-    origin: [usize; 2],
+    tile: TileSplats,
     background: &[f32; 3],
     pixels: &TilePixels,
     gradient: &mut TileGradient,
     sums: &mut [SplatSums],
 ) {
+    let end = (pixels.end as usize).min(tile.list.len());
+    let (composited, skipped) = sums.split_at_mut(end);
+    skipped.fill([0.0; 12]);
     dispatch!(level, simd => {
         start(simd, background, pixels, gradient);
-        let end = (pixels.end as usize).min(list.len());
-        sums[end..].fill([0.0; 12]);
-        replay(simd, splats, &list[..end], origin, gradient, &mut sums[..end]);
+        replay(simd, tile, gradient, composited);
     });
 }
 
@@ -78,14 +78,8 @@ fn start<S: Simd>(simd: S, background: &[f32; 3], pixels: &TilePixels, gradient:
 }
 
 #[inline(always)]
-fn replay<S: Simd>(
-    simd: S,
-    splats: &[Splat],
-    list: &[TileEntry],
-    origin: [usize; 2],
-    gradient: &mut TileGradient,
-    out: &mut [SplatSums],
-) {
+fn replay<S: Simd>(simd: S, tile: TileSplats, gradient: &mut TileGradient, out: &mut [SplatSums]) {
+    let TileSplats { splats, list, origin } = tile;
     let [left, top] = origin.map(|pixel| pixel as f32);
     for (index, (entry, out)) in list.iter().zip(out).enumerate().rev() {
         let splat = &splats[entry.rank as usize];
@@ -136,15 +130,15 @@ impl<S: Simd> Sums<S> {
 
         // At the ceiling alpha does not move.
         let by_logarithm = at.raw.simd_lt(MAX_ALPHA as f32).select(weight * gain, zero);
-        let along_x = by_logarithm * falloff.dx;
-        let along_y = by_logarithm * dy;
+        let along_u = by_logarithm * at.u;
+        let along_v = by_logarithm * at.v;
         let sums = &mut self.0;
         sums[0] += by_logarithm;
-        sums[1] += along_x;
-        sums[2] += along_y;
-        sums[3] = along_x.mul_add(falloff.dx, sums[3]);
-        sums[4] = along_x.mul_add(dy, sums[4]);
-        sums[5] = along_y.mul_add(dy, sums[5]);
+        sums[1] += along_u;
+        sums[2] += along_v;
+        sums[3] = along_u.mul_add(at.u, sums[3]);
+        sums[4] = along_u.mul_add(at.v, sums[4]);
+        sums[5] = along_v.mul_add(at.v, sums[5]);
         for (sum, by_colour) in sums[6..9].iter_mut().zip(by_colour) {
             *sum = weight.mul_add(by_colour, *sum);
         }

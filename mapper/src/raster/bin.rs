@@ -160,7 +160,7 @@ impl Outline {
         let left = (block * BLOCK_WIDTH) as f32 - self.centre[0];
         let low = (left - self.margin).max(-radius);
         let high = (left + (BLOCK_WIDTH - 1) as f32 + self.margin).min(radius);
-        if !(low <= high) {
+        if low > high || high.is_nan() {
             return (0, 0);
         }
         let chord = |dx: f32, side: f32| {

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::backward::{SplatSums, TileGradient, backward};
 use super::bin::Bins;
-use super::forward::{TilePixels, composite};
+use super::forward::{TilePixels, TileSplats, composite};
 use super::image::{RasterImage, TileRows, load_gradient};
 use super::lanes::ViewNumbers;
 use super::order::{NO_RANK, Order};
@@ -162,8 +162,7 @@ impl Rasterizer {
         let RasterScratch { bins, order, tiles, .. } = scratch;
         tiles.resize(bins.grid.len(), TilePixels::default());
         tiles.par_iter_mut().with_max_len(4).enumerate().for_each(|(tile, pixels)| {
-            let origin = bins.grid.origin(tile);
-            composite::<COUNT>(self.level, &order.splats, bins.list(tile), origin, pixels);
+            composite::<COUNT>(self.level, tile_splats(order, bins, tile), pixels);
         });
     }
 
@@ -194,9 +193,9 @@ impl Rasterizer {
             let (tile, grid) = (tiles.start, &scratch.bins.grid);
             let mut gradient = TileGradient::default();
             load_gradient(by_image, grid, tile, &mut gradient);
-            let (splats, list) = (&scratch.order.splats, scratch.bins.list(tile));
+            let splats = tile_splats(&scratch.order, &scratch.bins, tile);
             let (pixels, background) = (&scratch.tiles[tile], &scratch.background);
-            backward(self.level, splats, list, grid.origin(tile), background, pixels, &mut gradient, sums);
+            backward(self.level, splats, background, pixels, &mut gradient, sums);
         }
     }
 
@@ -243,6 +242,10 @@ impl Rasterizer {
             }
         }
     }
+}
+
+fn tile_splats<'a>(order: &'a Order, bins: &'a Bins, tile: usize) -> TileSplats<'a> {
+    TileSplats { splats: &order.splats, list: bins.list(tile), origin: bins.grid.origin(tile) }
 }
 
 fn bin(view: &RasterView, scratch: &mut RasterScratch) {

@@ -11,38 +11,42 @@ use fearless_simd::{f32x8, i32x8, prelude::*};
 const ROUNDING: f32 = 12_582_912.0;
 
 /// Minimax polynomial of `exp` on `[-ln 2/2, ln 2/2]`, constant term first; relative error 1.1e-7.
-const EXP: [f32; 6] =
+const MINIMAX: [f64; 6] =
     [1.000_000_07, 0.999_999_692, 0.499_988_948, 0.166_675_747, 0.041_915_382_6, 0.008_297_655_11];
 
-/// The same polynomial in `x/ln 2`.
-const EXP2: [f32; 6] = {
-    const LN_2: f64 = core::f64::consts::LN_2;
-    [
-        1.000_000_07,
-        (0.999_999_692 * LN_2) as f32,
-        (0.499_988_948 * LN_2 * LN_2) as f32,
-        (0.166_675_747 * LN_2 * LN_2 * LN_2) as f32,
-        (0.041_915_382_6 * LN_2 * LN_2 * LN_2 * LN_2) as f32,
-        (0.008_297_655_11 * LN_2 * LN_2 * LN_2 * LN_2 * LN_2) as f32,
-    ]
-};
+const EXP: [f32; 6] = scaled(1.0);
 
-/// Arguments of [`exp2_negative`] below this count as this: `2^-24` is far below any visible alpha.
-const LEAST: f32 = -24.0;
+/// The same polynomial in `-x/ln 2`.
+const EXP2_OF_MINUS: [f32; 6] = scaled(-core::f64::consts::LN_2);
+
+/// Coefficients of the polynomial in `x/unit`.
+const fn scaled(unit: f64) -> [f32; 6] {
+    let mut coefficients = [0.0; 6];
+    let (mut power, mut k) = (1.0, 0);
+    while k < 6 {
+        coefficients[k] = (MINIMAX[k] * power) as f32;
+        power *= unit;
+        k += 1;
+    }
+    coefficients
+}
+
+/// Arguments of [`exp2_of_minus`] above this count as this: `2^-24` is far below any visible alpha.
+const FAINTEST: f32 = 24.0;
 
 /// Arguments of [`exp`] beyond this count as this; the result is a normal number.
 const LARGEST: f32 = 87.0;
 
 /// `ln 2` in two parts; products of the first with small integers are exact.
-const LN_2: [f32; 2] = [0.693_359_375, -2.121_944_4e-4];
+const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
 
-/// `2^x` for `x <= 0` within 3e-7 relatively; positive arguments count as zero, those below -24 as -24.
+/// `2^-x` within 3e-7 relatively for `0 <= x <= 24`; larger arguments count as 24, small negative ones are allowed.
 #[inline(always)]
-pub(super) fn exp2_negative<S: Simd>(x: f32x8<S>) -> f32x8<S> {
-    let x = x.max(LEAST).min(0.0);
-    let shifted = x + ROUNDING;
-    let fraction = x - (shifted - ROUNDING);
-    scale_by_power(polynomial(fraction, &EXP2), shifted)
+pub(super) fn exp2_of_minus<S: Simd>(x: f32x8<S>) -> f32x8<S> {
+    let x = x.min(FAINTEST);
+    let shifted = f32x8::splat(x.token(), ROUNDING) - x;
+    let fraction = x + (shifted - ROUNDING);
+    scale_by_power(polynomial(fraction, &EXP2_OF_MINUS), shifted)
 }
 
 /// `exp(x)` within 3e-7 relatively for `|x| <= 87`; arguments beyond count as 87 or -87. The result for NaN is

@@ -66,27 +66,26 @@ impl TilePixels {
     }
 }
 
-/// Composites the splats of `list` into the tile whose first pixel is `origin`. With `COUNT`, counts the splats of
-/// every pixel.
-pub(super) fn composite<const COUNT: bool>(
-    level: Level,
-    splats: &[Splat],
-    list: &[TileEntry],
-    origin: [usize; 2],
-    pixels: &mut TilePixels,
-) {
+/// The splats of a tile.
+#[derive(Clone, Copy)]
+pub(super) struct TileSplats<'a> {
+    /// All splats by rank.
+    pub(super) splats: &'a [Splat],
+    /// Those of the tile.
+    pub(super) list: &'a [TileEntry],
+    /// Column and row of the first pixel of the tile.
+    pub(super) origin: [usize; 2],
+}
+
+/// Composites the splats of a tile into its pixels. With `COUNT`, counts the splats of every pixel.
+pub(super) fn composite<const COUNT: bool>(level: Level, tile: TileSplats, pixels: &mut TilePixels) {
     *pixels = TilePixels::default();
-    dispatch!(level, simd => composite_list::<_, COUNT>(simd, splats, list, origin, pixels));
+    dispatch!(level, simd => composite_list::<_, COUNT>(simd, tile, pixels));
 }
 
 #[inline(always)]
-fn composite_list<S: Simd, const COUNT: bool>(
-    simd: S,
-    splats: &[Splat],
-    list: &[TileEntry],
-    origin: [usize; 2],
-    pixels: &mut TilePixels,
-) {
+fn composite_list<S: Simd, const COUNT: bool>(simd: S, tile: TileSplats, pixels: &mut TilePixels) {
+    let TileSplats { splats, list, origin } = tile;
     let [left, top] = origin.map(|pixel| pixel as f32);
     for (index, entry) in list.iter().enumerate() {
         let splat = &splats[entry.rank as usize];

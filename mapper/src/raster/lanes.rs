@@ -55,7 +55,6 @@ pub(super) struct Lanes<S: Simd> {
     pub(super) opacity: f32x8<S>,
     /// `o (1 - o)` without cancellation.
     pub(super) opacity_slope: f32x8<S>,
-    pub(super) scale: [f32x8<S>; 3],
     /// Unit quaternion w x y z and the inverse of the stored one's length.
     pub(super) quaternion: [f32x8<S>; 4],
     pub(super) inverse_norm: f32x8<S>,
@@ -71,8 +70,8 @@ pub(super) struct Lanes<S: Simd> {
     /// Covariance on the image (xx, xy, yy) and its determinant.
     pub(super) covariance: [f32x8<S>; 3],
     pub(super) determinant: f32x8<S>,
-    /// Inverse of the covariance.
-    pub(super) conic: [f32x8<S>; 3],
+    /// Elements uu, uv and vv of the upper triangular W with `W^T W` the inverse of the covariance.
+    pub(super) whitening: [f32x8<S>; 3],
     /// Projected centre in pixels.
     pub(super) centre: [f32x8<S>; 2],
     /// Whether everything above makes sense and the Gaussian is in front of the camera.
@@ -136,8 +135,8 @@ impl<S: Simd> Lanes<S> {
             |i: usize| image_axes(view.focal[i], inverse_z, slope[i], &axes_camera[i], &axes_camera[2]),
         );
         let (covariance, determinant) = covariance(&axes_image);
-        let inverse = one / determinant;
-        let conic = [covariance[2] * inverse, -covariance[1] * inverse, covariance[0] * inverse];
+        let inverse = one / (determinant * covariance[2]).sqrt();
+        let whitening = [covariance[2] * inverse, -covariance[1] * inverse, one / covariance[2].sqrt()];
         let centre = [0, 1].map(
             #[inline(always)]
             |i: usize| exact[i].mul_add(view.focal[i], view.centre[i]),
@@ -145,15 +144,14 @@ impl<S: Simd> Lanes<S> {
 
         // A sum of numbers is finite only if all are: infinities and NaN fail every comparison below.
         let input = p.iter().fold(one, |sum, &value| sum + value * 0.0);
-        let output = conic[0] * 0.0 + conic[1] * 0.0 + conic[2] * 0.0 + centre[0] * 0.0 + centre[1] * 0.0;
-        let sane = (input + output + determinant * 0.0).simd_eq(1.0);
+        let output = whitening.iter().chain(&centre).fold(determinant * 0.0, |sum, &value| sum + value * 0.0);
+        let sane = (input + output).simd_eq(1.0);
         let visible = x_camera[2].simd_gt(NEAR_PLANE as f32) & opacity.simd_ge(MIN_ALPHA as f32);
         Self {
             mean,
             colour,
             opacity,
             opacity_slope: odds * opacity * opacity,
-            scale,
             quaternion,
             inverse_norm,
             axes_world,
@@ -165,7 +163,7 @@ impl<S: Simd> Lanes<S> {
             follows: [slope[0].simd_eq(exact[0]), slope[1].simd_eq(exact[1])],
             covariance,
             determinant,
-            conic,
+            whitening,
             centre,
             drawn: sane & visible & squared_norm.simd_gt(MIN_SQUARED_NORM),
         }
@@ -243,6 +241,6 @@ pub(super) fn dot3<S: Simd>(a: &[f32x8<S>; 3], b: &[f32x8<S>; 3]) -> f32x8<S> {
 }
 
 #[inline(always)]
-pub(super) fn dot4<S: Simd>(a: &[f32x8<S>; 4], b: &[f32x8<S>; 4]) -> f32x8<S> {
+fn dot4<S: Simd>(a: &[f32x8<S>; 4], b: &[f32x8<S>; 4]) -> f32x8<S> {
     a[0].mul_add(b[0], a[1].mul_add(b[1], a[2].mul_add(b[2], a[3] * b[3])))
 }

@@ -20,8 +20,9 @@ const EXPONENT_MARGIN: f32 = 0.005;
 pub(super) struct Splat {
     /// Projected centre, pixels.
     pub(super) centre: [f32; 2],
-    /// The logarithm to base 2 of the falloff is `xx dx^2 + xy dx dy + yy dy^2`.
-    pub(super) falloff: [f32; 3],
+    /// du/dx, du/dy and dv/dy of coordinates in which the splat falls off as `2^-(u^2 + v^2)`. A sum of squares
+    /// keeps digits that the quadratic form of a needle would cancel.
+    pub(super) whitening: [f32; 3],
     pub(super) opacity: f32,
     pub(super) colour: [f32; 3],
     /// Camera z of the centre, metres.
@@ -85,13 +86,14 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
     let extent = extent(simd, lanes);
     let drawn = lanes.drawn & overlaps_image(view, lanes, &extent);
     let drawn = drawn.to_bitmask();
-    let (c, k, rgb) = (&lanes.centre, &lanes.conic, &lanes.colour);
+    let (c, w, rgb) = (&lanes.centre, &lanes.whitening, &lanes.colour);
+    let scale = (0.5 * LOG2_E).sqrt();
     let splat = [
         c[0],
         c[1],
-        k[0] * (-0.5 * LOG2_E),
-        k[1] * -LOG2_E,
-        k[2] * (-0.5 * LOG2_E),
+        w[0] * scale,
+        w[1] * scale,
+        w[2] * scale,
         lanes.opacity,
         rgb[0],
         rgb[1],
@@ -110,7 +112,7 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
         *out = Projected {
             splat: Splat {
                 centre: [s[0], s[1]],
-                falloff: [s[2], s[3], s[4]],
+                whitening: [s[2], s[3], s[4]],
                 opacity: s[5],
                 colour: [s[6], s[7], s[8]],
                 depth: s[9],

@@ -1,10 +1,12 @@
 //! From gradients by splats to gradients by the parameters of Gaussians and by the pose.
 
+use core::f32::consts::LN_2;
+
 use fearless_simd::{Level, dispatch, f32x8, mask32x8, prelude::*};
 
 use super::backward::SplatSums;
 use super::bin::Bins;
-use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, dot4, load};
+use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, load};
 use super::reduce::{SUMS, reduce};
 use crate::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, PARAMETERS, PlanesMut, ROTATION};
 
@@ -119,21 +121,25 @@ fn add<S: Simd>(
 }
 
 impl<S: Simd> BySplat<S> {
-    /// From the sums of [`SplatSums`]. With `power = A dx^2/2 + B dx dy + C dy^2/2`, the gradient by the conic
-    /// (A, B, C) is `-(sxx/2, sxy, syy/2)`, that by the centre `(A sx + B sy, B sx + C sy)`.
+    /// From the sums of [`SplatSums`]. With `w = W d` the offset d in units of standard deviations, the gradient
+    /// by the centre is `W^T sum(s w)`, that by the covariance `W^T sum(s w w^T) W / 2`.
     #[inline(always)]
     fn new(simd: S, lanes: &Lanes<S>, sums: &[[f32; LANES]; SUMS]) -> Self {
-        let [s, sx, sy, sxx, sxy, syy, red, green, blue, depth] = sums.map(
+        let [s, su, sv, suu, suv, svv, red, green, blue, depth] = sums.map(
             #[inline(always)]
             |values| f32x8::from_slice(simd, &values),
         );
-        let [a, b, c] = lanes.conic;
-        // dL/dcovariance = -K G K with G = -1/2 [[sxx, sxy], [sxy, syy]].
-        let (ax, ay) = (a * sxx + b * sxy, a * sxy + b * syy);
-        let (cx, cy) = (b * sxx + c * sxy, b * sxy + c * syy);
+        // The pixels' u and v are in units in which the falloff is a power of two.
+        let unit = (2.0 * LN_2).sqrt();
+        let [p, q, r] = lanes.whitening.map(
+            #[inline(always)]
+            |w| w * unit,
+        );
+        let up = suu * p;
+        let (uq, vq) = (suu * q + suv * r, suv * q + svv * r);
         Self {
-            centre: [a * sx + b * sy, b * sx + c * sy],
-            covariance: [(ax * a + ay * b) * 0.5, ax * b + ay * c, (cx * b + cy * c) * 0.5],
+            centre: [p * su, q * su + r * sv],
+            covariance: [p * up * 0.5, p * uq, (q * uq + r * vq) * 0.5],
             opacity_logit: s * (lanes.opacity_slope / lanes.opacity),
             colour: [red, green, blue],
             depth,
@@ -236,28 +242,26 @@ impl<S: Simd> Lanes<S> {
         by_x
     }
 
-    /// By the quaternion through its normalisation, which leaves nothing along it.
+    /// By the quaternion through its normalisation. With t the gradient by a small turn of the axes in the world,
+    /// it is `2 (0, t) q/|q|`: nothing along q, and no symmetric part that would have to cancel.
     #[inline(always)]
     fn by_quaternion(&self, by_axes_world: &LaneMatrix<S, 3, 3>) -> [f32x8<S>; 4] {
-        let g = by_axes_world.map(
+        let (a, g) = (&self.axes_world, by_axes_world);
+        let turn = [(1, 2), (2, 0), (0, 1)].map(
             #[inline(always)]
-            |row| [row[0] * self.scale[0], row[1] * self.scale[1], row[2] * self.scale[2]],
+            |(i, k): (usize, usize)| {
+                let (plus, minus) = (dot3(&a[i], &g[k]), dot3(&a[k], &g[i]));
+                (plus - minus) * (self.inverse_norm + self.inverse_norm)
+            },
         );
         let [w, x, y, z] = self.quaternion;
-        let (zy, xz, yx) = (g[2][1] - g[1][2], g[0][2] - g[2][0], g[1][0] - g[0][1]);
-        let (xy, xz_sum, yz) = (g[0][1] + g[1][0], g[0][2] + g[2][0], g[1][2] + g[2][1]);
-        let by_unit = [
-            x * zy + y * xz + z * yx,
-            w * zy + y * xy + z * xz_sum - (x + x) * (g[1][1] + g[2][2]),
-            w * xz + x * xy + z * yz - (y + y) * (g[0][0] + g[2][2]),
-            w * yx + x * xz_sum + y * yz - (z + z) * (g[0][0] + g[1][1]),
-        ];
-        let radial = dot4(&self.quaternion, &by_unit);
-        let scale = self.inverse_norm + self.inverse_norm;
-        [0, 1, 2, 3].map(
-            #[inline(always)]
-            |k: usize| (by_unit[k] - self.quaternion[k] * radial) * scale,
-        )
+        let [tx, ty, tz] = turn;
+        [
+            -dot3(&turn, &[x, y, z]),
+            w * tx + (ty * z - tz * y),
+            w * ty + (tz * x - tx * z),
+            w * tz + (tx * y - ty * x),
+        ]
     }
 
     /// By the rows of R and t.

@@ -1,4 +1,5 @@
 //! The Gaussian rasterizer against golden data, its oracle, finite differences and hostile input.
 
 mod golden;
+mod ply;
 mod reference;

@@ -14,6 +14,7 @@ use fearless_simd::{Level, dispatch, f32x4, f32x8, prelude::*};
 use super::constants::{MAX_ALPHA, MIN_ALPHA};
 use super::falloff::BlockFalloff;
 use super::forward::{TilePixels, TileSplats};
+use super::lanes::each;
 use super::project::Splat;
 use super::tile::{BLOCK_WIDTH, TILE_COLUMNS, TILE_HEIGHT};
 
@@ -147,14 +148,13 @@ impl<S: Simd> Sums<S> {
 
     #[inline(always)]
     fn finish(self, simd: S) -> SplatSums {
-        let halves = self.0.map(
+        let [a, b, c, d, e, f, g, h, i, j] = each(
             #[inline(always)]
-            |sum| {
-                let (low, high) = sum.split();
+            |k| {
+                let (low, high) = self.0[k].split();
                 low + high
             },
         );
-        let [a, b, c, d, e, f, g, h, i, j] = halves;
         let zero = f32x4::splat(simd, 0.0);
         let mut out = [0.0; 12];
         sum_four(a, b, c, d).store_slice(&mut out[..4]);

@@ -105,12 +105,10 @@ impl Rasterizer {
         image: &mut RasterImage,
     ) {
         self.project(gaussians, view, scratch);
-        scratch.order.update(&scratch.projected);
-        bin(view, scratch);
-        self.composite::<false>(scratch);
-        let grid = scratch.bins.grid;
-        image.resize(grid.width, grid.height);
-        store_image(&scratch.tiles, &grid, &scratch.background, image.tile_rows());
+        self.order(scratch);
+        self.bin(view, scratch);
+        self.composite(scratch);
+        self.store_image(scratch, image);
     }
 
     /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
@@ -138,7 +136,7 @@ impl Rasterizer {
     /// Number of Gaussians composited at every pixel of the last view, row by row.
     #[must_use]
     pub fn contributions(&self, scratch: &mut RasterScratch) -> Vec<u32> {
-        self.composite::<true>(scratch);
+        self.composite_tiles::<true>(scratch);
         let grid = scratch.bins.grid;
         let count = |pixel: usize| {
             let (x, y) = (pixel % grid.width, pixel / grid.width);
@@ -147,7 +145,8 @@ impl Rasterizer {
         (0..grid.width * grid.height).map(count).collect()
     }
 
-    fn project(&self, gaussians: &Gaussians, view: &RasterView, scratch: &mut RasterScratch) {
+    /// First stage of [`Self::forward`]: projects every Gaussian.
+    pub fn project(&self, gaussians: &Gaussians, view: &RasterView, scratch: &mut RasterScratch) {
         scratch.view = ViewNumbers::new(view);
         scratch.background = view.background.map(|channel| channel as f32);
         scratch.projected.resize(gaussians.len(), Projected::default());
@@ -158,7 +157,34 @@ impl Rasterizer {
         });
     }
 
-    fn composite<const COUNT: bool>(&self, scratch: &mut RasterScratch) {
+    /// Second stage of [`Self::forward`]: sorts what is drawn by depth.
+    pub fn order(&self, scratch: &mut RasterScratch) {
+        scratch.order.update(&scratch.projected);
+    }
+
+    /// Third stage of [`Self::forward`]: lists the splats of every tile.
+    pub fn bin(&self, view: &RasterView, scratch: &mut RasterScratch) {
+        let RasterScratch { bins, order, .. } = scratch;
+        let grid = TileGrid::new(view.camera.width, view.camera.height);
+        bins.reset(grid, order.len());
+        let chunks = bins.chunks.par_iter_mut().enumerate();
+        chunks.for_each(|(chunk, entries)| entries.fill(&grid, order, chunk));
+        bins.gather();
+    }
+
+    /// Fourth stage of [`Self::forward`]: composites the splats of every tile.
+    pub fn composite(&self, scratch: &mut RasterScratch) {
+        self.composite_tiles::<false>(scratch);
+    }
+
+    /// Last stage of [`Self::forward`]: copies tiles to an image, which gets the size of the view.
+    pub fn store_image(&self, scratch: &RasterScratch, image: &mut RasterImage) {
+        let grid = scratch.bins.grid;
+        image.resize(grid.width, grid.height);
+        store_tiles(&scratch.tiles, &grid, &scratch.background, image.tile_rows());
+    }
+
+    fn composite_tiles<const COUNT: bool>(&self, scratch: &mut RasterScratch) {
         let RasterScratch { bins, order, tiles, .. } = scratch;
         tiles.resize(bins.grid.len(), TilePixels::default());
         tiles.par_iter_mut().with_max_len(4).enumerate().for_each(|(tile, pixels)| {
@@ -166,7 +192,8 @@ impl Rasterizer {
         });
     }
 
-    fn replay(&self, by_image: &RasterImage, scratch: &mut RasterScratch) {
+    /// First stage of [`Self::backward`], of which the conditions hold: sums of every splat over every tile.
+    pub fn replay(&self, by_image: &RasterImage, scratch: &mut RasterScratch) {
         let mut sums = core::mem::take(&mut scratch.sums);
         sums.resize(scratch.bins.entries.len(), [0.0; 12]);
         self.replay_tiles(by_image, scratch, 0..scratch.bins.grid.len(), &mut sums);
@@ -199,7 +226,8 @@ impl Rasterizer {
         }
     }
 
-    fn project_backward(
+    /// Last stage of [`Self::backward`], of which the conditions hold: sums over tiles, back to the parameters.
+    pub fn project_backward(
         &self,
         gaussians: &Gaussians,
         scratch: &mut RasterScratch,
@@ -248,23 +276,15 @@ fn tile_splats<'a>(order: &'a Order, bins: &'a Bins, tile: usize) -> TileSplats<
     TileSplats { splats: &order.splats, list: bins.list(tile), origin: bins.grid.origin(tile) }
 }
 
-fn bin(view: &RasterView, scratch: &mut RasterScratch) {
-    let RasterScratch { bins, order, .. } = scratch;
-    let grid = TileGrid::new(view.camera.width, view.camera.height);
-    bins.reset(grid, order.len());
-    bins.chunks.par_iter_mut().enumerate().for_each(|(chunk, entries)| entries.fill(&grid, order, chunk));
-    bins.gather();
-}
-
 /// Copies tiles to the rows of an image.
-fn store_image(tiles: &[TilePixels], grid: &TileGrid, background: &[f32; 3], mut rows: TileRows) {
+fn store_tiles(tiles: &[TilePixels], grid: &TileGrid, background: &[f32; 3], mut rows: TileRows) {
     let down = tiles.len() / grid.across.max(1);
     if down > 1 {
         let (upper_tiles, lower_tiles) = tiles.split_at(down / 2 * grid.across);
         let (upper, lower) = rows.split_at(down / 2);
         rayon::join(
-            || store_image(upper_tiles, grid, background, upper),
-            || store_image(lower_tiles, grid, background, lower),
+            || store_tiles(upper_tiles, grid, background, upper),
+            || store_tiles(lower_tiles, grid, background, lower),
         );
     } else {
         rows.store(tiles, background);

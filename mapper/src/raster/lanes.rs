@@ -78,15 +78,26 @@ pub(super) struct Lanes<S: Simd> {
     pub(super) drawn: mask32x8<S>,
 }
 
+/// What `f` makes of every index. Unlike the library's functions it is always inlined: a call out of line is not
+/// compiled for the instruction set of its caller.
+#[inline(always)]
+pub(super) fn each<T: Copy, const N: usize>(f: impl Fn(usize) -> T) -> [T; N] {
+    let mut out = [f(0); N];
+    for (k, element) in out.iter_mut().enumerate().skip(1) {
+        *element = f(k);
+    }
+    out
+}
+
 /// The Gaussians `first..` of every plane, zeros after the last.
 #[inline(always)]
 pub(super) fn load<S: Simd>(simd: S, planes: &[&[f32]; PARAMETERS], first: usize) -> [f32x8<S>; PARAMETERS] {
-    planes.map(
+    each(
         #[inline(always)]
-        |plane| match plane.get(first..first + LANES) {
+        |plane| match planes[plane].get(first..first + LANES) {
             Some(whole) => f32x8::from_slice(simd, whole),
             None => {
-                let rest = plane.get(first..).unwrap_or_default();
+                let rest = planes[plane].get(first..).unwrap_or_default();
                 let mut padded = [0.0; LANES];
                 padded[..rest.len()].copy_from_slice(rest);
                 f32x8::from_slice(simd, &padded)
@@ -109,37 +120,40 @@ impl<S: Simd> Lanes<S> {
         let stored = [p[ROTATION], p[ROTATION + 1], p[ROTATION + 2], p[ROTATION + 3]];
         let squared_norm = dot4(&stored, &stored);
         let inverse_norm = one / squared_norm.sqrt();
-        let quaternion = stored.map(
+        let quaternion = each(
             #[inline(always)]
-            |q| q * inverse_norm,
+            |k| stored[k] * inverse_norm,
         );
         let orientation = orientation(&quaternion);
-        let axes_world = orientation.map(
+        let axes_world = each(
             #[inline(always)]
-            |row| [row[0] * scale[0], row[1] * scale[1], row[2] * scale[2]],
+            |i| {
+                let [x, y, z] = orientation[i];
+                [x * scale[0], y * scale[1], z * scale[2]]
+            },
         );
-        let axes_camera = view.rotation.map(
+        let axes_camera: LaneMatrix<S, 3, 3> = each(
             #[inline(always)]
-            |row| combine_rows(&row, &axes_world),
+            |i| combine_rows(&view.rotation[i], &axes_world),
         );
 
         let x_camera = transform(view, &mean);
         let inverse_z = one / x_camera[2];
         let exact = [x_camera[0] * inverse_z, x_camera[1] * inverse_z];
-        let slope = [0, 1].map(
+        let slope = each(
             #[inline(always)]
-            |i: usize| exact[i].max(view.limits[i][0]).min(view.limits[i][1]),
+            |i| exact[i].max(view.limits[i][0]).min(view.limits[i][1]),
         );
-        let axes_image = [0, 1].map(
+        let axes_image = each(
             #[inline(always)]
-            |i: usize| image_axes(view.focal[i], inverse_z, slope[i], &axes_camera[i], &axes_camera[2]),
+            |i| image_axes(view.focal[i], inverse_z, slope[i], &axes_camera[i], &axes_camera[2]),
         );
         let (covariance, determinant) = covariance(&axes_image);
         let inverse = one / (determinant * covariance[2]).sqrt();
         let whitening = [covariance[2] * inverse, -covariance[1] * inverse, one / covariance[2].sqrt()];
-        let centre = [0, 1].map(
+        let centre = each(
             #[inline(always)]
-            |i: usize| exact[i].mul_add(view.focal[i], view.centre[i]),
+            |i| exact[i].mul_add(view.focal[i], view.centre[i]),
         );
 
         // A sum of numbers is finite only if all are: infinities and NaN fail every comparison below.
@@ -173,9 +187,9 @@ impl<S: Simd> Lanes<S> {
 /// A point of the world in the camera frame.
 #[inline(always)]
 fn transform<S: Simd>(view: &ViewNumbers, mean: &[f32x8<S>; 3]) -> [f32x8<S>; 3] {
-    [0, 1, 2].map(
+    each(
         #[inline(always)]
-        |i: usize| {
+        |i| {
             let [a, b, c] = view.rotation[i];
             mean[0].mul_add(a, mean[1].mul_add(b, mean[2].mul_add(c, view.translation[i])))
         },
@@ -185,11 +199,9 @@ fn transform<S: Simd>(view: &ViewNumbers, mean: &[f32x8<S>; 3]) -> [f32x8<S>; 3]
 /// The row `weights` times a matrix.
 #[inline(always)]
 fn combine_rows<S: Simd>(weights: &[f32; 3], matrix: &LaneMatrix<S, 3, 3>) -> [f32x8<S>; 3] {
-    [0, 1, 2].map(
+    each(
         #[inline(always)]
-        |j: usize| {
-            matrix[0][j].mul_add(weights[0], matrix[1][j].mul_add(weights[1], matrix[2][j] * weights[2]))
-        },
+        |j| matrix[0][j].mul_add(weights[0], matrix[1][j].mul_add(weights[1], matrix[2][j] * weights[2])),
     )
 }
 
@@ -202,9 +214,9 @@ fn image_axes<S: Simd>(
     across: &[f32x8<S>; 3],
     along: &[f32x8<S>; 3],
 ) -> [f32x8<S>; 3] {
-    [0, 1, 2].map(
+    each(
         #[inline(always)]
-        |j: usize| (across[j] - slope * along[j]) * (inverse_z * focal),
+        |j| (across[j] - slope * along[j]) * (inverse_z * focal),
     )
 }
 

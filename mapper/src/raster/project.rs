@@ -5,7 +5,7 @@ use core::f32::consts::LOG2_E;
 use fearless_simd::{Level, dispatch, f32x8, mask32x8, prelude::*};
 
 use super::constants::MIN_ALPHA;
-use super::lanes::{LANES, Lanes, ViewNumbers, load};
+use super::lanes::{LANES, Lanes, ViewNumbers, each, load};
 use crate::gaussians::PARAMETERS;
 
 /// Depth key of a Gaussian that is not drawn.
@@ -101,13 +101,13 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
         lanes.x_camera[2],
     ];
     for (lane, out) in out.iter_mut().enumerate() {
-        let s = splat.map(
+        let s: [f32; 10] = each(
             #[inline(always)]
-            |values| values[lane],
+            |k| splat[k][lane],
         );
-        let e = extent.map(
+        let e: [f32; 5] = each(
             #[inline(always)]
-            |values| values[lane],
+            |k| extent[k][lane],
         );
         *out = Projected {
             splat: Splat {
@@ -142,9 +142,9 @@ fn extent<S: Simd>(simd: S, lanes: &Lanes<S>) -> [f32x8<S>; 5] {
 /// Whether the bounding box reaches a pixel centre.
 #[inline(always)]
 fn overlaps_image<S: Simd>(view: &ViewNumbers, lanes: &Lanes<S>, extent: &[f32x8<S>; 5]) -> mask32x8<S> {
-    let along = [0, 1].map(
+    let along: [mask32x8<S>; 2] = each(
         #[inline(always)]
-        |i: usize| {
+        |i| {
             let (low, high) = (lanes.centre[i] - extent[i], lanes.centre[i] + extent[i]);
             high.simd_ge(0.0) & low.simd_le(view.last[i])
         },

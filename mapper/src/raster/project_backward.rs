@@ -6,7 +6,7 @@ use fearless_simd::{Level, dispatch, f32x8, mask32x8, prelude::*};
 
 use super::backward::SplatSums;
 use super::bin::Bins;
-use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, load};
+use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, each, load};
 use super::reduce::{SUMS, reduce};
 use crate::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, PARAMETERS, PlanesMut, ROTATION};
 
@@ -125,15 +125,15 @@ impl<S: Simd> BySplat<S> {
     /// by the centre is `W^T sum(s w)`, that by the covariance `W^T sum(s w w^T) W / 2`.
     #[inline(always)]
     fn new(simd: S, lanes: &Lanes<S>, sums: &[[f32; LANES]; SUMS]) -> Self {
-        let [s, su, sv, suu, suv, svv, red, green, blue, depth] = sums.map(
+        let [s, su, sv, suu, suv, svv, red, green, blue, depth] = each(
             #[inline(always)]
-            |values| f32x8::from_slice(simd, &values),
+            |k| f32x8::from_slice(simd, &sums[k]),
         );
         // The pixels' u and v are in units in which the falloff is a power of two.
         let unit = (2.0 * LN_2).sqrt();
-        let [p, q, r] = lanes.whitening.map(
+        let [p, q, r] = each(
             #[inline(always)]
-            |w| w * unit,
+            |k| lanes.whitening[k] * unit,
         );
         let up = suu * p;
         let (uq, vq) = (suu * q + suv * r, suv * q + svv * r);
@@ -156,25 +156,25 @@ impl<S: Simd> Lanes<S> {
         by_splat: &BySplat<S>,
     ) -> ([f32x8<S>; PARAMETERS], LaneMatrix<S, 3, 4>) {
         let by_axes_image = self.by_axes_image(by_splat);
-        let [across_x, across_y] = [0, 1].map(
+        let [across_x, across_y] = each(
             #[inline(always)]
-            |i: usize| self.inverse_z * view.focal[i],
+            |i| self.inverse_z * view.focal[i],
         );
         let by_axes_camera: LaneMatrix<S, 3, 3> = {
             let [v, w] = by_axes_image;
             let (x, y) = (across_x * self.slope[0], across_y * self.slope[1]);
             [
-                v.map(
+                each(
                     #[inline(always)]
-                    |v| v * across_x,
+                    |j| v[j] * across_x,
                 ),
-                w.map(
+                each(
                     #[inline(always)]
-                    |w| w * across_y,
+                    |j| w[j] * across_y,
                 ),
-                [0, 1, 2].map(
+                each(
                     #[inline(always)]
-                    |j: usize| -(v[j] * x + w[j] * y),
+                    |j| -(v[j] * x + w[j] * y),
                 ),
             ]
         };
@@ -205,13 +205,13 @@ impl<S: Simd> Lanes<S> {
         let (xx, yy) = (xx + xx, yy + yy);
         let [v, w] = &self.axes_image;
         [
-            [0, 1, 2].map(
+            each(
                 #[inline(always)]
-                |j: usize| xx.mul_add(v[j], xy * w[j]),
+                |j| xx.mul_add(v[j], xy * w[j]),
             ),
-            [0, 1, 2].map(
+            each(
                 #[inline(always)]
-                |j: usize| xy.mul_add(v[j], yy * w[j]),
+                |j| xy.mul_add(v[j], yy * w[j]),
             ),
         ]
     }
@@ -247,9 +247,10 @@ impl<S: Simd> Lanes<S> {
     #[inline(always)]
     fn by_quaternion(&self, by_axes_world: &LaneMatrix<S, 3, 3>) -> [f32x8<S>; 4] {
         let (a, g) = (&self.axes_world, by_axes_world);
-        let turn = [(1, 2), (2, 0), (0, 1)].map(
+        let turn: [f32x8<S>; 3] = each(
             #[inline(always)]
-            |(i, k): (usize, usize)| {
+            |axis| {
+                let (i, k) = ((axis + 1) % 3, (axis + 2) % 3);
                 let (plus, minus) = (dot3(&a[i], &g[k]), dot3(&a[k], &g[i]));
                 (plus - minus) * (self.inverse_norm + self.inverse_norm)
             },
@@ -271,13 +272,16 @@ impl<S: Simd> Lanes<S> {
         by_axes_camera: &LaneMatrix<S, 3, 3>,
         by_x_camera: &[f32x8<S>; 3],
     ) -> LaneMatrix<S, 3, 4> {
-        [0, 1, 2].map(
+        each(
             #[inline(always)]
-            |i: usize| {
+            |i| {
                 let by_x = by_x_camera[i];
-                let element =
-                    |j: usize| by_x.mul_add(self.mean[j], dot3(&by_axes_camera[i], &self.axes_world[j]));
-                [element(0), element(1), element(2), by_x]
+                let axes = &by_axes_camera[i];
+                let [x, y, z] = each(
+                    #[inline(always)]
+                    |j| by_x.mul_add(self.mean[j], dot3(axes, &self.axes_world[j])),
+                );
+                [x, y, z, by_x]
             },
         )
     }
@@ -286,12 +290,12 @@ impl<S: Simd> Lanes<S> {
 /// Takes columns in the camera frame to the world.
 #[inline(always)]
 fn rotate_back<S: Simd>(view: &ViewNumbers, columns: &LaneMatrix<S, 3, 3>) -> LaneMatrix<S, 3, 3> {
-    [0, 1, 2].map(
+    each(
         #[inline(always)]
-        |i: usize| {
-            [0, 1, 2].map(
+        |i| {
+            each(
                 #[inline(always)]
-                |j: usize| column(&view.rotation, i, &[columns[0][j], columns[1][j], columns[2][j]]),
+                |j| column(&view.rotation, i, &[columns[0][j], columns[1][j], columns[2][j]]),
             )
         },
     )

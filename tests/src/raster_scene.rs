@@ -4,8 +4,11 @@ use mba_mapper::gaussians::{Gaussian, Gaussians};
 use mba_mapper::raster::pose::ViewGradient;
 use mba_mapper::raster::reference::{ReferenceGaussian, ReferencePixelGradient};
 use mba_mapper::raster::{GaussianGradients, RasterImage, RasterScratch, RasterView, Rasterizer};
+use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::simd::Level;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
+
+use crate::transfer_scene::Uniform;
 
 /// What the fast path makes of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,4 +65,54 @@ pub fn to_image(view: &RasterView, by_pixels: &ReferencePixelGradient) -> Raster
 
 fn to_f32(vector: &Vector3<f64>) -> [f32; 3] {
     vector.map(|value| value as f32).into()
+}
+
+/// A camera that looks at a cloud of Gaussians from an oblique pose, with a background.
+#[must_use]
+pub fn random_view(uniform: &mut Uniform, width: usize, height: usize) -> RasterView {
+    let mut draw = |range: f64| uniform.within(-range, range);
+    let tangent = Vector6::new(draw(0.3), draw(0.3), draw(0.3), draw(0.6), draw(0.6), draw(0.6));
+    RasterView {
+        camera: PinholeCamera {
+            width,
+            height,
+            fx: 0.9 * width as f64,
+            fy: 1.1 * width as f64,
+            cx: 0.5 * width as f64 - 2.3,
+            cy: 0.5 * height as f64 + 1.7,
+        },
+        world_from_camera: RigidTransform::identity().perturbed(&tangent),
+        background: [0.3, 0.1, 0.6],
+    }
+}
+
+/// Gaussians in front of the camera, a few beyond the borders of the image, with quaternions of any length.
+#[must_use]
+pub fn random_gaussians(uniform: &mut Uniform, view: &RasterView, count: usize) -> Vec<ReferenceGaussian> {
+    let camera = &view.camera;
+    (0..count)
+        .map(|_| {
+            let z = uniform.within(0.6, 4.0);
+            let u = uniform.within(-0.2, 1.2) * camera.width as f64;
+            let v = uniform.within(-0.2, 1.2) * camera.height as f64;
+            ReferenceGaussian {
+                mean: view.world_from_camera.transform_point(&(camera.ray(u, v) * z)),
+                scale: Vector3::from_fn(|_, _| uniform.within(-4.5, -1.2).exp()),
+                rotation: core::array::from_fn(|_| uniform.within(-1.5, 1.5)),
+                opacity: uniform.within(0.05, 0.98),
+                colour: Vector3::from_fn(|_, _| uniform.within(0.0, 1.0)),
+            }
+        })
+        .collect()
+}
+
+/// A random gradient by the pixels of a view.
+#[must_use]
+pub fn random_pixel_gradient(uniform: &mut Uniform, view: &RasterView) -> ReferencePixelGradient {
+    let pixels = view.camera.width * view.camera.height;
+    ReferencePixelGradient {
+        colour: (0..pixels).map(|_| Vector3::from_fn(|_, _| uniform.within(-1.0, 1.0))).collect(),
+        depth: (0..pixels).map(|_| uniform.within(-1.0, 1.0)).collect(),
+        alpha: (0..pixels).map(|_| uniform.within(-1.0, 1.0)).collect(),
+    }
 }

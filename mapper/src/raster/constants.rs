@@ -19,3 +19,9 @@ pub const NEAR_PLANE: f64 = 0.01;
 /// How far beyond the image border, as a fraction of half the image, the Jacobian of the projection follows the
 /// centre of a Gaussian; farther out the linearisation would stretch it without bound.
 pub const JACOBIAN_MARGIN: f64 = 0.3;
+
+/// Gaussians whose centre has a larger camera z than this, metres, are not drawn; nothing that far away is mapped.
+pub const FAR_PLANE: f64 = 1e5;
+
+/// Gaussians of which a colour channel is farther from zero than this, linear light, are not drawn: white is 1.
+pub const MAX_COLOUR: f64 = 1e4;

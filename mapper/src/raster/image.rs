@@ -97,6 +97,9 @@ pub(super) fn load_gradient(image: &RasterImage, grid: &TileGrid, tile: usize, o
     for (block, rows) in out.iter_mut().enumerate() {
         let left = left + block * BLOCK_WIDTH;
         let columns = BLOCK_WIDTH.min(grid.width.saturating_sub(left));
+        if columns == 0 {
+            break;
+        }
         for (row, y) in rows.iter_mut().zip(top..grid.height) {
             let GradientRow { by_colour, by_depth, by_alpha, .. } = row;
             let first = y * grid.width + left;

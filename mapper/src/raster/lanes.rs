@@ -4,7 +4,7 @@
 
 use fearless_simd::{f32x8, mask32x8, prelude::*};
 
-use super::constants::{LOW_PASS, MIN_ALPHA, NEAR_PLANE};
+use super::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, MIN_ALPHA, NEAR_PLANE};
 use super::exp::exp;
 use super::view::RasterView;
 use crate::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, PARAMETERS, ROTATION};
@@ -160,7 +160,9 @@ impl<S: Simd> Lanes<S> {
         let input = p.iter().fold(one, |sum, &value| sum + value * 0.0);
         let output = whitening.iter().chain(&centre).fold(determinant * 0.0, |sum, &value| sum + value * 0.0);
         let sane = (input + output).simd_eq(1.0);
-        let visible = x_camera[2].simd_gt(NEAR_PLANE as f32) & opacity.simd_ge(MIN_ALPHA as f32);
+        let depth = x_camera[2].simd_gt(NEAR_PLANE as f32) & x_camera[2].simd_lt(FAR_PLANE as f32);
+        let brightest = colour[0].abs().max(colour[1].abs()).max(colour[2].abs());
+        let visible = depth & brightest.simd_lt(MAX_COLOUR as f32) & opacity.simd_ge(MIN_ALPHA as f32);
         Self {
             mean,
             colour,

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3, Vector4};
 
 use super::{ReferenceGaussian, ReferenceGradient, SplatGradient};
-use crate::raster::constants::{LOW_PASS, NEAR_PLANE};
+use crate::raster::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, NEAR_PLANE};
 use crate::raster::pose::ViewGradient;
 use crate::raster::view::RasterView;
 
@@ -36,7 +36,7 @@ struct Steps {
     conic: Matrix2<f64>,
 }
 
-/// The splat of a Gaussian, or `None` if it is not drawn: too near or behind the camera, or with a parameter that
+/// The splat of a Gaussian, or `None` if it is not drawn: behind the camera, too near or too far, or with a parameter that
 /// makes no sense (not finite, no opacity, no orientation).
 pub(super) fn project(gaussian: &ReferenceGaussian, view: &RasterView) -> Option<Splat> {
     let steps = Steps::new(gaussian, view);
@@ -45,7 +45,8 @@ pub(super) fn project(gaussian: &ReferenceGaussian, view: &RasterView) -> Option
     let centre = Vector2::new(camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy);
     let finite = centre.iter().chain(&steps.conic).chain(&gaussian.colour).all(|v| v.is_finite());
     let opaque = gaussian.opacity > 0.0 && gaussian.opacity <= 1.0;
-    (z > NEAR_PLANE && z.is_finite() && finite && opaque).then_some(Splat {
+    let in_range = z > NEAR_PLANE && z < FAR_PLANE && gaussian.colour.amax() < MAX_COLOUR;
+    (in_range && finite && opaque).then_some(Splat {
         centre,
         conic: steps.conic,
         opacity: gaussian.opacity,

@@ -1,3 +1,4 @@
 //! Fixed-seed inputs shared by the benchmarks.
 
+pub mod raster;
 pub mod transfer;

@@ -4,6 +4,8 @@ pub mod dataset;
 pub mod deblurring;
 mod error;
 pub mod evaluation;
+pub mod gaussians;
+pub mod raster;
 pub mod run;
 pub mod synth;
 mod text_lines;

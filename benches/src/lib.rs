@@ -1,4 +1,5 @@
 //! Fixed-seed inputs shared by the benchmarks.
 
+pub mod raster;
 pub mod recording;
 pub mod transfer;

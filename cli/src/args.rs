@@ -188,7 +188,8 @@ pub struct Info {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 RUN gets trajectory.txt (TUM lines at mid exposure), exposures.txt (poses at opening, middle and closing), \
-frames.csv and summary.json. It is kept up to date while the run goes on.
+frames.csv, summary.json and deblurred/, the keyframes without their blur. It is kept up to date while the \
+run goes on.
 
 Examples:
   mba track rgbd_dataset_freiburg1_rpy --out run
@@ -220,6 +221,9 @@ pub struct Tracking {
     /// Use the depth map of each frame, or only that of the keyframe
     #[arg(long, value_enum, default_value_t)]
     pub depth_term: Switch,
+    /// Write the deblurred image of every keyframe, after the last frame
+    #[arg(long, value_enum, default_value_t)]
+    pub keyframes: Switch,
 }
 
 /// Values of `--blur`.

@@ -1,8 +1,11 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
 pub mod dataset;
+pub mod deblurring;
 mod error;
 pub mod evaluation;
+pub mod gaussians;
+pub mod raster;
 pub mod run;
 pub mod synth;
 mod text_lines;

@@ -1,4 +1,4 @@
-//! Text files that appear whole or not at all.
+//! Files that appear whole or not at all.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,8 +11,9 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {
 }
 
 /// Writes several files that belong together: none is replaced before all of them are on the disk.
-pub(crate) fn write_together(files: &[(PathBuf, String)]) -> Result<(), FileError> {
-    let written = files.iter().try_for_each(|(path, text)| attempt(path, fs::write(partial(path), text)));
+pub(crate) fn write_together<C: AsRef<[u8]>>(files: &[(PathBuf, C)]) -> Result<(), FileError> {
+    let written =
+        files.iter().try_for_each(|(path, content)| attempt(path, fs::write(partial(path), content)));
     let placed = written
         .and_then(|()| files.iter().try_for_each(|(path, _)| attempt(path, fs::rename(partial(path), path))));
     if placed.is_err() {

@@ -2,6 +2,8 @@
 
 pub mod handheld;
 pub mod plane_scene;
+pub mod raster_golden;
+pub mod raster_scene;
 pub mod reference_values;
 pub mod small_dataset;
 pub mod transfer_scene;

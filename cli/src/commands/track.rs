@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use mba_mapper::dataset::Dataset;
+use mba_mapper::deblurring::write_deblurred_keyframes;
 use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
-use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset};
+use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
 use super::open;
@@ -47,6 +48,9 @@ pub fn track_into(
         }
         other => other?,
     }
+    if args.keyframes == Switch::On {
+        deblur_keyframes(dataset, args, &mut writer, console)?;
+    }
     let merit = Merit::of(writer.exposures(), dataset);
     let summary = writer.finish(|summary| {
         summary.trajectory = merit.trajectory;
@@ -59,6 +63,19 @@ pub fn track_into(
     }
     console.note(format!("wrote {}", out.display()));
     Ok(summary)
+}
+
+fn deblur_keyframes(
+    dataset: &Dataset,
+    args: &Tracking,
+    writer: &mut RunWriter,
+    console: &Console,
+) -> Result<(), RunError> {
+    let config = tracker_config(dataset, &TrackingOptions::from(args));
+    let progress = console.progress(writer.keyframes().len(), "deblurring");
+    let written = write_deblurred_keyframes(dataset, &config, writer, || progress.inc(1));
+    progress.finish_and_clear();
+    written
 }
 
 fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {

@@ -9,9 +9,9 @@ use super::table::percent;
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page.
+/// The whole page; `keyframes` is its section with pictures.
 #[must_use]
-pub(super) fn page(run: &Run, plots: &[Plot]) -> String {
+pub(super) fn page(run: &Run, plots: &[Plot], keyframes: &str) -> String {
     let summary = &run.summary;
     let title = escape(&data_set_name(summary));
     let charts: String =
@@ -37,7 +37,7 @@ pub(super) fn page(run: &Run, plots: &[Plot]) -> String {
 <header><h1>{title}</h1><p>{folder}</p></header>
 {notices}<section class="tiles">
 {tiles}</section>
-<h2>Charts</h2>
+{keyframes}<h2>Charts</h2>
 <section class="charts">
 {charts}</section>
 <h2>Figures</h2>
@@ -114,6 +114,7 @@ fn frames_table(summary: &Summary) -> String {
         ["lost".to_owned(), counts.lost.to_string()],
         ["skipped (unreadable image)".to_owned(), counts.skipped.to_string()],
         ["keyframes".to_owned(), counts.keyframes.to_string()],
+        ["deblurred keyframes".to_owned(), summary.deblurred_keyframes.to_string()],
     ];
     card("Frames", &rows)
 }

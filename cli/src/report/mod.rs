@@ -1,7 +1,9 @@
 //! Results for people: tables in the terminal, charts, and the report of a run.
 
 mod chart;
+mod compare;
 mod html;
+mod pictures;
 mod plots;
 pub mod table;
 mod view;
@@ -21,11 +23,11 @@ pub const REPORT_FILE: &str = "report.html";
 /// Name of the folder of charts in a RUN folder.
 pub const PLOTS_FOLDER: &str = "plots";
 
-/// Writes the charts of a run as `plots/*.svg` and the report; `dataset` supplies the ground truth. Returns the
-/// report's path.
+/// Writes the charts of a run as `plots/*.svg` and the report; `dataset` supplies the ground truth and
+/// the captured images. Returns the report's path.
 ///
 /// # Errors
-/// When a file cannot be written.
+/// When a file cannot be written or a chart or picture cannot be made.
 pub fn write(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<PathBuf> {
     let plots = plots(run, &RunView::new(run, dataset))?;
     let folder = run.folder.join(PLOTS_FOLDER);
@@ -34,7 +36,8 @@ pub fn write(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<PathBuf> {
         write_whole(&folder.join(plot.name).with_extension("svg"), &stand_alone(&plot.svg))?;
     }
     let report = run.folder.join(REPORT_FILE);
-    write_whole(&report, &html::page(run, &plots))?;
+    let keyframes = compare::section(&pictures::keyframe_pictures(run, dataset)?);
+    write_whole(&report, &html::page(run, &plots, &keyframes))?;
     Ok(report)
 }
 

@@ -40,7 +40,8 @@ pub fn summary(summary: &Summary) -> String {
     let doubt = [("weak", counts.weak), ("lost", counts.lost), ("skipped", counts.skipped)];
     let doubt: String = doubt.iter().map(|(name, n)| format!(", {n} {name}")).collect();
     let tracked = format!("{} of {}{doubt}", percent(counts.tracked_share()), counts.total);
-    let mut rows = vec![("tracked", tracked), ("keyframes", counts.keyframes.to_string())];
+    let keyframes = format!("{}, {} deblurred", counts.keyframes, summary.deblurred_keyframes);
+    let mut rows = vec![("tracked", tracked), ("keyframes", keyframes)];
     let spread = |s: &Spread, unit: &str| {
         format!("median {:.2}, p95 {:.2}, p99 {:.2}, max {:.2} {unit}", s.median, s.p95, s.p99, s.max)
     };

@@ -7,6 +7,7 @@ mod alignment;
 mod association;
 mod exposure;
 mod figures;
+mod image;
 mod statistics;
 mod trajectory;
 
@@ -14,6 +15,7 @@ pub use alignment::{Alignment, AlignmentError, Similarity, align};
 pub use association::{DEFAULT_MAX_DT, Match, associate};
 pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, blur_length, evaluate_blur, motion_of};
 pub use figures::{BlurFigures, TrajectoryFigures};
+pub use image::{ImageError, psnr};
 pub use statistics::{Statistics, quantile, share_within};
 pub use trajectory::{
     GOOD_FRAME_METRES, TrajectoryError, TrajectoryEvaluation, TrajectoryOptions, evaluate_trajectory,

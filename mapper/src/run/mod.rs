@@ -6,9 +6,11 @@
 //! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
 //! | `frames.csv` | one [`FrameRecord`] per frame |
 //! | `summary.json` | a [`Summary`] |
+//! | `deblurred/NNNNNN.png` | the deblurred image of every keyframe, named by the index of the frame |
 //!
 //! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
 
+mod deblurred;
 mod error;
 mod frame_record;
 mod merit;
@@ -16,6 +18,7 @@ mod reader;
 mod summary;
 mod writer;
 
+pub use deblurred::{DEBLURRED_FOLDER, deblurred_path};
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
 pub use merit::{Merit, mid_pose};

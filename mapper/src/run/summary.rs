@@ -33,6 +33,9 @@ pub struct Summary {
     pub settings: RunSettings,
     /// Frames by status.
     pub frames: FrameCounts,
+    /// Keyframes whose deblurred image lies in the folder.
+    #[serde(default)]
+    pub deblurred_keyframes: usize,
     /// Tracking time per frame in milliseconds, over all frames that were tried.
     pub milliseconds: Option<Spread>,
     /// Estimated blur length in pixels, over all frames that were not lost.
@@ -119,6 +122,7 @@ impl Summary {
                 skipped,
                 keyframes: frames.iter().filter(|f| f.keyframe != 0).count(),
             },
+            deblurred_keyframes: 0,
             milliseconds: Spread::of(&times),
             blur_px: Spread::of(&blurs),
             trajectory: None,

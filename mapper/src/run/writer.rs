@@ -4,6 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::deblurred::remove_deblurred;
 use super::merit::mid_pose;
 use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
 use super::{FrameRecord, RunError, RunSettings, Summary, frame_record};
@@ -24,6 +25,7 @@ pub struct RunWriter {
     exposures: Vec<TimedExposure>,
     frames: Vec<FrameRecord>,
     skipped: usize,
+    deblurred: usize,
     warnings: Vec<String>,
     unwritten: usize,
 }
@@ -36,12 +38,14 @@ impl RunWriter {
     /// [`RunError::Unwritable`] or [`RunError::DiskFull`].
     pub fn create(folder: &Path, settings: RunSettings) -> Result<Self, RunError> {
         fs::create_dir_all(folder).map_err(|reason| RunError::unwritable(folder, reason))?;
+        remove_deblurred(folder)?;
         let mut writer = Self {
             folder: folder.to_owned(),
             settings,
             exposures: Vec::new(),
             frames: Vec::new(),
             skipped: 0,
+            deblurred: 0,
             warnings: Vec::new(),
             unwritten: 0,
         };
@@ -90,6 +94,26 @@ impl RunWriter {
         &self.exposures
     }
 
+    /// Index and exposure of every keyframe so far.
+    #[must_use]
+    pub fn keyframes(&self) -> Vec<(usize, TimedExposure)> {
+        let all = self.exposures.iter().zip(&self.frames).enumerate();
+        all.filter(|(_, (_, record))| record.keyframe != 0)
+            .map(|(index, (exposure, _))| (index, *exposure))
+            .collect()
+    }
+
+    /// Counts a keyframe whose deblurred image was written.
+    pub fn count_deblurred(&mut self) {
+        self.deblurred += 1;
+    }
+
+    /// The folder of the run.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
     /// Brings all files up to date, marked as incomplete.
     ///
     /// # Errors
@@ -114,7 +138,7 @@ impl RunWriter {
 
     fn summary(&self) -> Summary {
         let summary = Summary::of(&self.settings, &self.frames, self.skipped);
-        Summary { warnings: self.warnings.clone(), ..summary }
+        Summary { warnings: self.warnings.clone(), deblurred_keyframes: self.deblurred, ..summary }
     }
 
     fn write(&self, summary: &Summary) -> Result<(), RunError> {

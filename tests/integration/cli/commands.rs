@@ -89,9 +89,11 @@ fn a_tracked_run_can_be_evaluated_and_reported() {
     assert_eq!(report.code, Some(0), "{}", report.stderr);
     let page = fs::read_to_string(run.join("report.html")).unwrap();
     assert_eq!(page.matches("<svg").count(), 5);
-    for outside in ["<script src", "<link", "<img", "url(", "@import"] {
+    for outside in ["<script src", "<link", "url(", "@import"] {
         assert!(!page.contains(outside), "the report asks for another file: {outside}");
     }
+    let inside = page.matches("<img src=\"data:image/jpeg;base64,").count();
+    assert_eq!(page.matches("<img").count(), inside, "the report asks for another picture");
     assert!(run.join("plots/trajectory_top.svg").is_file());
 }
 

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod keyframes;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

@@ -1,0 +1,13 @@
+//! Sharp colour images of keyframes, for people to look at.
+//!
+//! The tracker deblurs the luminance of its keyframes for its own use. Here the same operator, the mean of light along
+//! the motion that was estimated for the frame, is inverted for each colour after the run, when all estimates are
+//! final and nobody waits.
+
+mod encode;
+mod keyframe;
+mod run_keyframes;
+
+pub use encode::ForwardResponse;
+pub use keyframe::{DeblurError, DeblurMemory, Deblurred, KeyframeDeblurrer};
+pub use run_keyframes::write_deblurred_keyframes;

@@ -1,0 +1,308 @@
+//! From gradients by splats to gradients by the parameters of Gaussians and by the pose.
+
+use core::f32::consts::LN_2;
+
+use fearless_simd::{Level, dispatch, f32x8, mask32x8, prelude::*};
+
+use super::backward::SplatSums;
+use super::bin::Bins;
+use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, each, load};
+use super::reduce::{SUMS, reduce};
+use crate::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, PARAMETERS, PlanesMut, ROTATION};
+
+/// Gradient by the rows of `camera_from_world`: three of R and t each.
+pub(super) type ViewSums = [f32; 12];
+
+/// A range of Gaussians to which gradients are added.
+pub(super) struct GradientRange<'a> {
+    pub(super) planes: PlanesMut<'a>,
+    /// Length of the gradient by the projected centre, per pixel.
+    pub(super) screen: &'a mut [f32],
+}
+
+impl GradientRange<'_> {
+    /// The part before Gaussian `middle` of the range and the rest.
+    pub(super) fn split_at(self, middle: usize) -> (Self, Self) {
+        let (planes, other_planes) = self.planes.split_at(middle);
+        let (screen, other_screen) = self.screen.split_at_mut(planes.len());
+        (Self { planes, screen }, Self { planes: other_planes, screen: other_screen })
+    }
+}
+
+/// What the gradients of a range follow from.
+pub(super) struct SplatGradients<'a> {
+    pub(super) view: &'a ViewNumbers,
+    pub(super) planes: &'a [&'a [f32]; PARAMETERS],
+    pub(super) rank_from_gaussian: &'a [u32],
+    pub(super) bins: &'a Bins,
+    pub(super) sums: &'a [SplatSums],
+}
+
+/// Gradient by the splats of eight Gaussians.
+struct BySplat<S: Simd> {
+    centre: [f32x8<S>; 2],
+    /// By the covariance on the image: xx, xy (both places together), yy.
+    covariance: [f32x8<S>; 3],
+    opacity_logit: f32x8<S>,
+    colour: [f32x8<S>; 3],
+    depth: f32x8<S>,
+}
+
+/// Adds the gradients of the Gaussians `first..` to `out`, and returns what they give to the pose.
+pub(super) fn project_backward(
+    level: Level,
+    input: &SplatGradients,
+    first: usize,
+    out: &mut GradientRange,
+) -> ViewSums {
+    dispatch!(level, simd => backward_range(simd, input, first, out))
+}
+
+#[inline(always)]
+fn backward_range<S: Simd>(
+    simd: S,
+    input: &SplatGradients,
+    first: usize,
+    out: &mut GradientRange,
+) -> ViewSums {
+    let mut by_view = [[f32x8::splat(simd, 0.0); 4]; 3];
+    let mut sums = [[0.0; LANES]; SUMS];
+    let ranks = input.rank_from_gaussian[first..first + out.planes.len()].chunks(LANES);
+    for (step, ranks) in ranks.enumerate() {
+        if reduce(ranks, input.bins, input.sums, &mut sums) {
+            let at = step * LANES;
+            let lanes = Lanes::new(simd, input.view, &load(simd, input.planes, first + at));
+            let by_splat = BySplat::new(simd, &lanes, &sums);
+            let (by_parameters, by_rows) = lanes.backward(input.view, &by_splat);
+            let finite = is_finite(simd, &by_parameters);
+            add(out, at, ranks.len(), finite, &by_parameters, &by_splat);
+            let zero = f32x8::splat(simd, 0.0);
+            for (sum, row) in by_view.as_flattened_mut().iter_mut().zip(by_rows.as_flattened()) {
+                *sum += finite.select(*row, zero);
+            }
+        }
+    }
+    let mut totals = [0.0; 12];
+    totals.iter_mut().zip(by_view.as_flattened()).for_each(|(total, sum)| *total = sum.reduce_sum());
+    totals
+}
+
+/// Gaussians whose numbers overflowed get no gradient.
+#[inline(always)]
+fn is_finite<S: Simd>(simd: S, by_parameters: &[f32x8<S>; PARAMETERS]) -> mask32x8<S> {
+    by_parameters.iter().fold(f32x8::splat(simd, 0.0), |sum, &value| sum + value * 0.0).simd_eq(0.0)
+}
+
+#[inline(always)]
+fn add<S: Simd>(
+    out: &mut GradientRange,
+    at: usize,
+    count: usize,
+    finite: mask32x8<S>,
+    by_parameters: &[f32x8<S>; PARAMETERS],
+    by_splat: &BySplat<S>,
+) {
+    let [u, v] = by_splat.centre;
+    let screen = u.mul_add(u, v * v).sqrt();
+    let zero = f32x8::splat(u.token(), 0.0);
+    let add = |plane: &mut [f32], values: f32x8<S>| {
+        let values = finite.select(values, zero);
+        let plane = &mut plane[at..at + count];
+        if count == LANES {
+            (f32x8::from_slice(u.token(), plane) + values).store_slice(plane);
+        } else {
+            plane.iter_mut().enumerate().for_each(|(lane, sum)| *sum += values[lane]);
+        }
+    };
+    for (plane, &values) in out.planes.planes.iter_mut().zip(by_parameters) {
+        add(plane, values);
+    }
+    add(out.screen, screen);
+}
+
+impl<S: Simd> BySplat<S> {
+    /// From the sums of [`SplatSums`]. With `w = W d` the offset d in units of standard deviations, the gradient
+    /// by the centre is `W^T sum(s w)`, that by the covariance `W^T sum(s w w^T) W / 2`.
+    #[inline(always)]
+    fn new(simd: S, lanes: &Lanes<S>, sums: &[[f32; LANES]; SUMS]) -> Self {
+        let [s, su, sv, suu, suv, svv, red, green, blue, depth] = each(
+            #[inline(always)]
+            |k| f32x8::from_slice(simd, &sums[k]),
+        );
+        // The pixels' u and v are in units in which the falloff is a power of two.
+        let unit = (2.0 * LN_2).sqrt();
+        let [p, q, r] = each(
+            #[inline(always)]
+            |k| lanes.whitening[k] * unit,
+        );
+        let up = suu * p;
+        let (uq, vq) = (suu * q + suv * r, suv * q + svv * r);
+        Self {
+            centre: [p * su, q * su + r * sv],
+            covariance: [p * up * 0.5, p * uq, (q * uq + r * vq) * 0.5],
+            opacity_logit: s * (lanes.opacity_slope / lanes.opacity),
+            colour: [red, green, blue],
+            depth,
+        }
+    }
+}
+
+impl<S: Simd> Lanes<S> {
+    /// Gradient by the parameters, and by the rows of `camera_from_world`.
+    #[inline(always)]
+    fn backward(
+        &self,
+        view: &ViewNumbers,
+        by_splat: &BySplat<S>,
+    ) -> ([f32x8<S>; PARAMETERS], LaneMatrix<S, 3, 4>) {
+        let by_axes_image = self.by_axes_image(by_splat);
+        let [across_x, across_y] = each(
+            #[inline(always)]
+            |i| self.inverse_z * view.focal[i],
+        );
+        let by_axes_camera: LaneMatrix<S, 3, 3> = {
+            let [v, w] = by_axes_image;
+            let (x, y) = (across_x * self.slope[0], across_y * self.slope[1]);
+            [
+                each(
+                    #[inline(always)]
+                    |j| v[j] * across_x,
+                ),
+                each(
+                    #[inline(always)]
+                    |j| w[j] * across_y,
+                ),
+                each(
+                    #[inline(always)]
+                    |j| -(v[j] * x + w[j] * y),
+                ),
+            ]
+        };
+        let by_x_camera = self.by_x_camera(view, by_splat, &by_axes_image);
+        let by_axes_world = rotate_back(view, &by_axes_camera);
+
+        let zero = f32x8::splat(self.opacity.token(), 0.0);
+        let mut by_parameters = [zero; PARAMETERS];
+        for j in 0..3 {
+            by_parameters[MEAN + j] = column(&view.rotation, j, &by_x_camera);
+            by_parameters[LOG_SCALE + j] = (0..3).fold(
+                zero,
+                #[inline(always)]
+                |sum, i| by_axes_world[i][j].mul_add(self.axes_world[i][j], sum),
+            );
+            by_parameters[COLOUR + j] = by_splat.colour[j];
+        }
+        let by_quaternion = self.by_quaternion(&by_axes_world);
+        by_parameters[ROTATION..ROTATION + 4].copy_from_slice(&by_quaternion);
+        by_parameters[OPACITY_LOGIT] = by_splat.opacity_logit;
+        (by_parameters, self.by_view(&by_axes_camera, &by_x_camera))
+    }
+
+    /// By the axes on the image: twice the gradient by the covariance, times the axes.
+    #[inline(always)]
+    fn by_axes_image(&self, by_splat: &BySplat<S>) -> LaneMatrix<S, 2, 3> {
+        let [xx, xy, yy] = by_splat.covariance;
+        let (xx, yy) = (xx + xx, yy + yy);
+        let [v, w] = &self.axes_image;
+        [
+            each(
+                #[inline(always)]
+                |j| xx.mul_add(v[j], xy * w[j]),
+            ),
+            each(
+                #[inline(always)]
+                |j| xy.mul_add(v[j], yy * w[j]),
+            ),
+        ]
+    }
+
+    /// By the centre in the camera frame: it moves the splat, its depth, and the Jacobian that shapes it.
+    #[inline(always)]
+    fn by_x_camera(
+        &self,
+        view: &ViewNumbers,
+        by_splat: &BySplat<S>,
+        by_axes_image: &LaneMatrix<S, 2, 3>,
+    ) -> [f32x8<S>; 3] {
+        let zero = f32x8::splat(self.opacity.token(), 0.0);
+        let mut by_x = [zero, zero, by_splat.depth];
+        for i in 0..2 {
+            let per_pixel = self.inverse_z * view.focal[i];
+            let by_centre = by_splat.centre[i] * per_pixel;
+            by_x[i] = by_centre;
+            by_x[2] -= by_centre * (self.x_camera[i] * self.inverse_z);
+            // An image axis is (across - slope along) f/z: it shrinks with z and turns with the slope.
+            let shrink = dot3(&by_axes_image[i], &self.axes_image[i]) * self.inverse_z;
+            let turn = dot3(&by_axes_image[i], &self.axes_camera[2]) * per_pixel * self.inverse_z;
+            let turn = self.follows[i].select(turn, zero);
+            by_x[2] -= shrink;
+            by_x[i] -= turn;
+            by_x[2] = turn.mul_add(self.slope[i], by_x[2]);
+        }
+        by_x
+    }
+
+    /// By the quaternion through its normalisation. With t the gradient by a small turn of the axes in the world,
+    /// it is `2 (0, t) q/|q|`: nothing along q, and no symmetric part that would have to cancel.
+    #[inline(always)]
+    fn by_quaternion(&self, by_axes_world: &LaneMatrix<S, 3, 3>) -> [f32x8<S>; 4] {
+        let (a, g) = (&self.axes_world, by_axes_world);
+        let turn: [f32x8<S>; 3] = each(
+            #[inline(always)]
+            |axis| {
+                let (i, k) = ((axis + 1) % 3, (axis + 2) % 3);
+                let (plus, minus) = (dot3(&a[i], &g[k]), dot3(&a[k], &g[i]));
+                (plus - minus) * (self.inverse_norm + self.inverse_norm)
+            },
+        );
+        let [w, x, y, z] = self.quaternion;
+        let [tx, ty, tz] = turn;
+        [
+            -dot3(&turn, &[x, y, z]),
+            w * tx + (ty * z - tz * y),
+            w * ty + (tz * x - tx * z),
+            w * tz + (tx * y - ty * x),
+        ]
+    }
+
+    /// By the rows of R and t.
+    #[inline(always)]
+    fn by_view(
+        &self,
+        by_axes_camera: &LaneMatrix<S, 3, 3>,
+        by_x_camera: &[f32x8<S>; 3],
+    ) -> LaneMatrix<S, 3, 4> {
+        each(
+            #[inline(always)]
+            |i| {
+                let by_x = by_x_camera[i];
+                let axes = &by_axes_camera[i];
+                let [x, y, z] = each(
+                    #[inline(always)]
+                    |j| by_x.mul_add(self.mean[j], dot3(axes, &self.axes_world[j])),
+                );
+                [x, y, z, by_x]
+            },
+        )
+    }
+}
+
+/// Takes columns in the camera frame to the world.
+#[inline(always)]
+fn rotate_back<S: Simd>(view: &ViewNumbers, columns: &LaneMatrix<S, 3, 3>) -> LaneMatrix<S, 3, 3> {
+    each(
+        #[inline(always)]
+        |i| {
+            each(
+                #[inline(always)]
+                |j| column(&view.rotation, i, &[columns[0][j], columns[1][j], columns[2][j]]),
+            )
+        },
+    )
+}
+
+/// Column `j` of a matrix times a vector.
+#[inline(always)]
+fn column<S: Simd>(matrix: &[[f32; 3]; 3], j: usize, vector: &[f32x8<S>; 3]) -> f32x8<S> {
+    vector[0].mul_add(matrix[0][j], vector[1].mul_add(matrix[1][j], vector[2] * matrix[2][j]))
+}

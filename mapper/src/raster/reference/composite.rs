@@ -1,0 +1,117 @@
+//! Compositing of the splats at one pixel, front to back, and its derivative.
+
+use nalgebra::{Vector2, Vector3};
+
+use super::projection::Splat;
+use super::{Cutoff, SplatGradient};
+use crate::raster::constants::{MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE};
+
+/// A splat at a pixel.
+struct Contribution {
+    /// Index into the splats.
+    splat: usize,
+    /// From the centre of the splat to the pixel.
+    offset: Vector2<f64>,
+    alpha: f64,
+    /// Derivative of alpha by the logarithm of what it was before ceiling and cutoff.
+    alpha_by_logarithm: f64,
+    /// Transmittance in front of the splat.
+    transmittance: f64,
+}
+
+/// What a pixel shows.
+pub(super) struct Pixel {
+    pub(super) colour: Vector3<f64>,
+    pub(super) depth: f64,
+    pub(super) alpha: f64,
+    contributions: Vec<Contribution>,
+}
+
+/// Gradient by what a pixel shows.
+pub(super) struct PixelGradient {
+    pub(super) colour: Vector3<f64>,
+    pub(super) depth: f64,
+    pub(super) alpha: f64,
+}
+
+/// Composites the splats, which are sorted by depth, at the pixel `at`.
+pub(super) fn composite(
+    splats: &[Splat],
+    at: Vector2<f64>,
+    background: &Vector3<f64>,
+    cutoff: Cutoff,
+) -> Pixel {
+    let mut transmittance = 1.0;
+    let mut pixel = Pixel { colour: Vector3::zeros(), depth: 0.0, alpha: 0.0, contributions: Vec::new() };
+    for (index, splat) in splats.iter().enumerate() {
+        let offset = at - splat.centre;
+        let raw = splat.opacity * (-0.5 * (splat.conic * offset).dot(&offset)).exp();
+        let Some((alpha, alpha_by_logarithm)) = effective_alpha(raw, cutoff) else { continue };
+        let behind = transmittance * (1.0 - alpha);
+        if cutoff == Cutoff::Hard && behind <= MIN_TRANSMITTANCE {
+            break;
+        }
+        let weight = alpha * transmittance;
+        pixel.colour += weight * splat.colour;
+        pixel.depth += weight * splat.depth;
+        let contribution = Contribution { splat: index, offset, alpha, alpha_by_logarithm, transmittance };
+        pixel.contributions.push(contribution);
+        transmittance = behind;
+    }
+    pixel.colour += transmittance * background;
+    pixel.alpha = 1.0 - transmittance;
+    pixel
+}
+
+/// Alpha after ceiling and cutoff, and its derivative by `ln raw`; `None` if the splat is skipped.
+fn effective_alpha(raw: f64, cutoff: Cutoff) -> Option<(f64, f64)> {
+    let (alpha, by_logarithm) = if raw < MAX_ALPHA { (raw, raw) } else { (MAX_ALPHA, 0.0) };
+    // From here up to twice as much, the smooth cutoff fades a splat in.
+    let excess = (alpha - MIN_ALPHA) / MIN_ALPHA;
+    match cutoff {
+        Cutoff::Hard => (alpha >= MIN_ALPHA).then_some((alpha, by_logarithm)),
+        Cutoff::Smooth if excess >= 1.0 => Some((alpha, by_logarithm)),
+        Cutoff::Smooth => (excess > 0.0).then(|| {
+            let fade = excess * excess * (3.0 - 2.0 * excess);
+            let fade_by_alpha = 6.0 * excess * (1.0 - excess) / MIN_ALPHA;
+            (alpha * fade, by_logarithm * (fade + alpha * fade_by_alpha))
+        }),
+    }
+}
+
+impl Pixel {
+    /// Number of splats composited.
+    pub(super) fn contributions(&self) -> u32 {
+        self.contributions.len() as u32
+    }
+
+    /// Adds the gradient by every splat of the pixel. Walking back to front, `behind` is the value of the loss's
+    /// linear form on everything behind a splat as seen through no other.
+    pub(super) fn backward(
+        &self,
+        splats: &[Splat],
+        background: &Vector3<f64>,
+        by_pixel: &PixelGradient,
+        gradients: &mut [SplatGradient],
+    ) {
+        let mut behind = by_pixel.colour.dot(background);
+        for contribution in self.contributions.iter().rev() {
+            let splat = &splats[contribution.splat];
+            let gradient = &mut gradients[contribution.splat];
+            let weight = contribution.alpha * contribution.transmittance;
+            gradient.colour += weight * by_pixel.colour;
+            gradient.depth += weight * by_pixel.depth;
+
+            let own = by_pixel.colour.dot(&splat.colour) + by_pixel.depth * splat.depth + by_pixel.alpha;
+            let by_alpha = contribution.transmittance * (own - behind);
+            let by_logarithm = by_alpha * contribution.alpha_by_logarithm;
+            gradient.opacity += by_logarithm / splat.opacity;
+            let offset = contribution.offset;
+            gradient.centre += by_logarithm * (splat.conic * offset);
+            gradient.conic[0] -= by_logarithm * 0.5 * offset.x * offset.x;
+            gradient.conic[1] -= by_logarithm * offset.x * offset.y;
+            gradient.conic[2] -= by_logarithm * 0.5 * offset.y * offset.y;
+            behind += contribution.alpha * (own - behind);
+        }
+    }
+}

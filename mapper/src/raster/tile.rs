@@ -1,0 +1,65 @@
+//! Tiles: the unit of lists and of work.
+
+/// Pixels of a row that are computed together: one vector.
+pub(super) const BLOCK_WIDTH: usize = 8;
+
+/// Vectors side by side in a tile.
+pub(super) const TILE_COLUMNS: usize = 2;
+
+/// Width of a tile in pixels.
+pub(super) const TILE_WIDTH: usize = TILE_COLUMNS * BLOCK_WIDTH;
+
+/// Height of a tile in pixels.
+pub(super) const TILE_HEIGHT: usize = 16;
+
+/// The tiles of an image, row by row; those at the right and bottom border may stick out.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct TileGrid {
+    pub(super) width: usize,
+    pub(super) height: usize,
+    /// Tiles per row and rows of tiles.
+    pub(super) across: usize,
+    pub(super) down: usize,
+}
+
+impl TileGrid {
+    pub(super) fn new(width: usize, height: usize) -> Self {
+        Self { width, height, across: width.div_ceil(TILE_WIDTH), down: height.div_ceil(TILE_HEIGHT) }
+    }
+
+    /// Number of tiles.
+    pub(super) fn len(&self) -> usize {
+        self.across * self.down
+    }
+
+    /// The tile of a pixel.
+    pub(super) fn tile_of(&self, x: usize, y: usize) -> usize {
+        y / TILE_HEIGHT * self.across + x / TILE_WIDTH
+    }
+
+    /// Column and row of the first pixel of a tile.
+    pub(super) fn origin(&self, tile: usize) -> [usize; 2] {
+        [tile % self.across * TILE_WIDTH, tile / self.across * TILE_HEIGHT]
+    }
+}
+
+/// Rows of a block that a splat touches, counted from the top of the tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct RowRange {
+    pub(super) start: u8,
+    pub(super) end: u8,
+}
+
+/// A splat in the list of a tile.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct TileEntry {
+    pub(super) rank: u32,
+    /// Rows of every block of the tile that the splat touches.
+    pub(super) rows: [RowRange; TILE_COLUMNS],
+}
+
+impl TileEntry {
+    pub(super) fn is_empty(&self) -> bool {
+        self.rows.iter().all(|rows| rows.start >= rows.end)
+    }
+}

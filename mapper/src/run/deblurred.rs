@@ -1,0 +1,90 @@
+//! The deblurred keyframes of a RUN folder.
+
+use std::fs;
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, ImageEncoder};
+
+use super::{RunError, RunWriter};
+use crate::whole_file::write_together;
+
+/// Name of the folder of deblurred keyframes.
+pub const DEBLURRED_FOLDER: &str = "deblurred";
+
+/// Where a run in `folder` keeps the deblurred image of keyframe `index`, the index of the frame in the data set.
+#[must_use]
+pub fn deblurred_path(folder: &Path, index: usize) -> PathBuf {
+    folder.join(DEBLURRED_FOLDER).join(format!("{index:06}.png"))
+}
+
+impl RunWriter {
+    /// Writes the deblurred image of keyframe `index`: `rgb` holds red, green, blue of each of `width * height`
+    /// pixels, row-major, encoded as the data set's images are. Can be called from several threads.
+    ///
+    /// # Errors
+    /// [`RunError::Unwritable`], also for an image that does not have that size, or [`RunError::DiskFull`].
+    pub fn write_deblurred(
+        &self,
+        index: usize,
+        [width, height]: [usize; 2],
+        rgb: Vec<u8>,
+    ) -> Result<(), RunError> {
+        let path = deblurred_path(self.folder(), index);
+        let folder = self.folder().join(DEBLURRED_FOLDER);
+        fs::create_dir_all(&folder).map_err(|reason| RunError::unwritable(&folder, reason))?;
+        let png = png([width, height], &rgb).map_err(|reason| RunError::unwritable(&path, reason))?;
+        write_together(&[(path, png)]).map_err(RunError::from_write)
+    }
+}
+
+/// Removes the images of an earlier run in `folder`, and nothing else.
+pub(super) fn remove_deblurred(folder: &Path) -> Result<(), RunError> {
+    let images = folder.join(DEBLURRED_FOLDER);
+    let Ok(files) = fs::read_dir(&images) else { return Ok(()) };
+    for path in files.flatten().map(|file| file.path()).filter(|path| is_keyframe_image(path)) {
+        fs::remove_file(&path).map_err(|reason| RunError::unwritable(&path, reason))?;
+    }
+    // Whatever else lies in the folder is somebody else's and stays.
+    let _ = fs::remove_dir(&images);
+    Ok(())
+}
+
+fn is_keyframe_image(path: &Path) -> bool {
+    let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+    let is_number = stem.len() >= 6 && stem.bytes().all(|byte| byte.is_ascii_digit());
+    is_number && path.extension().is_some_and(|extension| extension == "png")
+}
+
+fn png([width, height]: [usize; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
+    let mut png = Cursor::new(Vec::new());
+    if rgb.len() != 3 * width * height {
+        let size = format!("{} values are no image of {width} x {height} pixels", rgb.len());
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, size));
+    }
+    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
+        .write_image(rgb, width as u32, height as u32, ExtendedColorType::Rgb8)
+        .map_err(io::Error::other)?;
+    Ok(png.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_images_of_keyframes_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let images = folder.path().join(DEBLURRED_FOLDER);
+        remove_deblurred(folder.path()).unwrap();
+        fs::create_dir(&images).unwrap();
+        for name in ["000012.png", "1234567.png", "notes.png", "000012.txt"] {
+            fs::write(images.join(name), "").unwrap();
+        }
+        remove_deblurred(folder.path()).unwrap();
+        let mut left: Vec<_> = fs::read_dir(&images).unwrap().map(|file| file.unwrap().file_name()).collect();
+        left.sort();
+        assert_eq!(left, ["000012.txt", "notes.png"]);
+    }
+}

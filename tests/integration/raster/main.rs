@@ -1,0 +1,9 @@
+//! The Gaussian rasterizer against golden data, its oracle, finite differences and hostile input.
+
+mod derivatives;
+mod golden;
+mod levels;
+mod ply;
+mod poison;
+mod reference;
+mod threads;

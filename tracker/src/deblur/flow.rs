@@ -119,9 +119,12 @@ mod tests {
         PinholeCamera { width: 100, height: 72, fx: 90.0, fy: 95.0, cx: 48.0, cy: 36.0 };
     const INVERSE_DEPTH: f32 = 0.4;
 
+    /// Centre and displacement of a block.
+    type Block = ([f64; 2], [f64; 2]);
+
     /// The flow of `motion`, as centre and displacement per block, and the longest; the left half of the image has
     /// a plane, the rest the fallback of twice its inverse depth.
-    fn flow(motion: Vector6<f64>) -> (Vec<([f64; 2], [f64; 2])>, f32) {
+    fn flow(motion: Vector6<f64>) -> (Vec<Block>, f32) {
         let (width, height) = (50, 36);
         let mut value: Vec<f32> =
             (0..width * height).map(|k| if k % width < 24 { INVERSE_DEPTH } else { 0.0 }).collect();

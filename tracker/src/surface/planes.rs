@@ -160,7 +160,7 @@ mod tests {
     #[test]
     fn an_exact_plane_is_recovered_despite_holes() {
         let rho = |u: usize, v: usize| 0.6 + 0.003 * u as f32 - 0.002 * v as f32;
-        let holes = |u: usize, v: usize| (3 * u + 5 * v) % 7 == 0;
+        let holes = |u: usize, v: usize| (3 * u + 5 * v).is_multiple_of(7);
         check_fit(
             |u, v| if holes(u, v) { 0.0 } else { rho(u, v) },
             |u, v, planes| {

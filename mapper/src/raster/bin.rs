@@ -28,7 +28,9 @@ pub(super) struct ChunkEntries {
 #[derive(Debug, Default)]
 pub(super) struct Bins {
     pub(super) grid: TileGrid,
-    pub(super) chunks: Vec<ChunkEntries>,
+    /// Chunks of splats; those beyond the splats of the view keep their memory.
+    chunks: Vec<ChunkEntries>,
+    used_chunks: usize,
     /// Where the list of every tile starts, and the end of the last.
     pub(super) tile_start: Vec<u32>,
     /// The lists, tile by tile.
@@ -51,7 +53,15 @@ impl Bins {
     /// Prepares for an image and a number of splats; the chunks are then to be filled.
     pub(super) fn reset(&mut self, grid: TileGrid, splats: usize) {
         self.grid = grid;
-        self.chunks.resize_with(splats.div_ceil(CHUNK), ChunkEntries::default);
+        self.used_chunks = splats.div_ceil(CHUNK);
+        if self.chunks.len() < self.used_chunks {
+            self.chunks.resize_with(self.used_chunks, ChunkEntries::default);
+        }
+    }
+
+    /// The chunks that are to be filled.
+    pub(super) fn chunks_mut(&mut self) -> &mut [ChunkEntries] {
+        &mut self.chunks[..self.used_chunks]
     }
 
     /// The list of a tile.
@@ -68,10 +78,11 @@ impl Bins {
     /// Sorts the entries of the chunks into the lists.
     pub(super) fn gather(&mut self) {
         self.count();
-        let total = self.chunks.iter().map(|chunk| chunk.entries.len()).sum();
+        let chunks = &self.chunks[..self.used_chunks];
+        let total = chunks.iter().map(|chunk| chunk.entries.len()).sum();
         self.entries.resize(total, TileEntry::default());
         self.slot_from_emission.clear();
-        for (tile, entry) in self.chunks.iter().flat_map(|chunk| &chunk.entries) {
+        for (tile, entry) in chunks.iter().flat_map(|chunk| &chunk.entries) {
             let slot = &mut self.tile_start[*tile as usize];
             self.entries[*slot as usize] = *entry;
             self.slot_from_emission.push(*slot);
@@ -88,7 +99,7 @@ impl Bins {
         self.tile_start.resize(self.grid.len() + 1, 0);
         self.first_emission.clear();
         let mut emissions = 0;
-        for chunk in &self.chunks {
+        for chunk in &self.chunks[..self.used_chunks] {
             for &count in &chunk.counts {
                 self.first_emission.push(emissions);
                 emissions += count;
@@ -224,7 +235,10 @@ mod tests {
         order.update(&projected);
         let grid = TileGrid::new(SIZE[0], SIZE[1]);
         bins.reset(grid, order.len());
-        bins.chunks.iter_mut().enumerate().for_each(|(chunk, entries)| entries.fill(&grid, &order, chunk));
+        bins.chunks_mut()
+            .iter_mut()
+            .enumerate()
+            .for_each(|(chunk, entries)| entries.fill(&grid, &order, chunk));
         bins.gather();
         (order, bins)
     }

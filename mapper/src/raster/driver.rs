@@ -167,7 +167,7 @@ impl Rasterizer {
         let RasterScratch { bins, order, .. } = scratch;
         let grid = TileGrid::new(view.camera.width, view.camera.height);
         bins.reset(grid, order.len());
-        let chunks = bins.chunks.par_iter_mut().enumerate();
+        let chunks = bins.chunks_mut().par_iter_mut().enumerate();
         chunks.for_each(|(chunk, entries)| entries.fill(&grid, order, chunk));
         bins.gather();
     }

@@ -86,6 +86,7 @@ fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
         "blur": if options.blur { "auto" } else { "off" },
         "virtual_views": options.virtual_views.map_or_else(|| json!("auto"), |n| json!(n)),
         "reference": format!("{:?}", options.reference).to_lowercase(),
+        "tracker_memory_bytes": tracker_config(dataset, &options).workspace_len(),
         "depth_term": if args.depth_term == Switch::On { "on" } else { "off" },
     });
     RunSettings {

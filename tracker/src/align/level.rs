@@ -10,7 +10,7 @@ use super::placement::{blur_length, place_sites};
 use super::prior::MotionPrior;
 use super::{AlignSettings, Estimate, UNKNOWNS};
 use crate::geometry::PinholeCamera;
-use crate::keyframe::Keypoint;
+use crate::keyframe::typical_inverse_depth;
 use crate::math::sqrt_f32;
 use crate::transfer::BrightnessModel;
 
@@ -177,7 +177,7 @@ impl Alignment<'_> {
             depth: None,
             prior: *prior,
             expected_brightness: self.expected_brightness,
-            inverse_depth: median_inverse_depth(keypoints),
+            inverse_depth: typical_inverse_depth(keypoints),
             settings: self.settings,
         };
         let kept = measure_photometric(&mut objective, &estimate, in_view, scratch);
@@ -272,9 +272,4 @@ fn step_in_pixels(step: &SVector<f64, UNKNOWNS>, camera: &PinholeCamera, inverse
     let centre = pixels(step.fixed_rows::<6>(0).into_owned());
     let motion = pixels(step.fixed_rows::<6>(6).into_owned());
     centre.max(0.5 * motion)
-}
-
-/// Inverse depth of the keypoint in the middle of the list, which is near the middle of the image.
-pub(super) fn median_inverse_depth(keypoints: &[Keypoint]) -> f64 {
-    keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
 }

@@ -4,4 +4,4 @@ mod frame;
 mod select;
 
 pub use frame::{Keyframe, MAX_KEYPOINTS};
-pub use select::{Keypoint, SelectionSettings, select_keypoints};
+pub use select::{Keypoint, SelectionSettings, select_keypoints, typical_inverse_depth};

@@ -71,6 +71,13 @@ pub fn select_keypoints(
     count
 }
 
+/// Inverse depth in 1/m of the keypoint in the middle of the list, which is near the middle of the image; 0.5 if
+/// there is none.
+#[must_use]
+pub fn typical_inverse_depth(keypoints: &[Keypoint]) -> f64 {
+    keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
+}
+
 /// The pixel of a cell with the largest whitened gradient, if it is strong enough.
 fn strongest(
     image: &LevelImage,

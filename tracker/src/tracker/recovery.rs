@@ -6,10 +6,9 @@ use fearless_simd::Level;
 use super::coarse_to_fine::FrameTask;
 use super::config::RECENT_KEYFRAMES;
 use super::history::Motion;
-use super::track::typical_inverse_depth;
 use crate::align::{AlignScratch, AlignSettings, Alignment, FrameData, ReferenceData};
 use crate::geometry::{PinholeCamera, RigidTransform};
-use crate::keyframe::Keyframe;
+use crate::keyframe::{Keyframe, typical_inverse_depth};
 use crate::transfer::BrightnessModel;
 use crate::workspace::{Arena, WorkspaceError};
 

@@ -16,7 +16,7 @@ use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
 use crate::geometry::RigidTransform;
 use crate::image::GreyPyramid;
-use crate::keyframe::{Keyframe, Keypoint, MAX_KEYPOINTS};
+use crate::keyframe::{Keyframe, MAX_KEYPOINTS, typical_inverse_depth};
 use crate::photometric::LuminanceTable;
 use crate::surface::InverseDepthMap;
 use crate::trajectory::ExposureTrajectory;
@@ -475,9 +475,4 @@ impl<'m> Tracker<'m> {
     fn blur_length(&self, keyframe_from_camera: &ExposureTrajectory) -> f32 {
         blur_length(keyframe_from_camera, self.keyframe.finest_keypoints(), &self.config.camera)
     }
-}
-
-/// Inverse depth of the middle keypoint, 1/m.
-pub(super) fn typical_inverse_depth(keypoints: &[Keypoint]) -> f64 {
-    keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
 }

@@ -4,6 +4,7 @@ pub mod dataset;
 pub mod deblurring;
 mod error;
 pub mod evaluation;
+pub mod exposure;
 pub mod gaussians;
 pub mod raster;
 pub mod run;

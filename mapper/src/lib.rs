@@ -6,6 +6,7 @@ mod error;
 pub mod evaluation;
 pub mod exposure;
 pub mod gaussians;
+pub mod losses;
 pub mod raster;
 pub mod run;
 pub mod synth;

@@ -1,5 +1,6 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
+pub mod checkpoint;
 pub mod dataset;
 pub mod deblurring;
 mod error;

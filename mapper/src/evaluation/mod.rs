@@ -8,6 +8,7 @@ mod association;
 mod exposure;
 mod figures;
 mod image;
+mod pose_alignment;
 mod statistics;
 mod trajectory;
 
@@ -16,6 +17,7 @@ pub use association::{DEFAULT_MAX_DT, Match, associate};
 pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, blur_length, evaluate_blur, motion_of};
 pub use figures::{BlurFigures, TrajectoryFigures};
 pub use image::{ImageError, psnr};
+pub use pose_alignment::{PoseAlignment, PoseAlignmentError, align_poses};
 pub use statistics::{Statistics, quantile, share_within};
 pub use trajectory::{
     GOOD_FRAME_METRES, TrajectoryError, TrajectoryEvaluation, TrajectoryOptions, evaluate_trajectory,

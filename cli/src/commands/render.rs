@@ -178,7 +178,7 @@ fn table(written: &Written) -> String {
     let mut rows = vec![
         ("views", format!("{} of {} x {} pixels", written.views, written.width, written.height)),
         ("Gaussians", written.gaussians.to_string()),
-        ("pixels that show the map", percent(written.solid_share)),
+        ("pixels showing the map", percent(written.solid_share)),
     ];
     rows.extend(
         written

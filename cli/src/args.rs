@@ -51,6 +51,8 @@ pub enum Command {
     Info(Info),
     /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
     Track(Track),
+    /// Render views of the map of a RUN folder from given poses
+    Render(Render),
     /// Write report.html and charts into a RUN folder
     Report(Report),
     /// Measure an estimate against a reference
@@ -268,6 +270,56 @@ impl From<&Tracking> for TrackingOptions {
             depth_term: args.depth_term == Switch::On,
         }
     }
+}
+
+/// Arguments of `mba render`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Poses are TUM lines, camera-to-world: timestamp tx ty tz qx qy qz qw. DIR gets NNNNNN.png, colours with the \
+response of the data set's camera, and depth/NNNNNN.png, 16 bit, 0 where the map is not solid. They are named by \
+the line in the file of poses, from 000000.
+
+A run has a world of its own, that of its first frame. With --align, the run's trajectory is aligned with FILE by \
+positions and orientations, and the poses may be in the frame of FILE.
+
+Examples:
+  mba render run --poses run/trajectory.txt --out views
+  mba render run --poses data/heldout_views/poses.txt --align data/groundtruth.txt --out views")]
+pub struct Render {
+    /// RUN folder with a map
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Poses to render from
+    #[arg(long, value_name = "FILE")]
+    pub poses: PathBuf,
+    /// Folder for the images
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Trajectory of the run's frames in the frame of the poses, e.g. the ground truth
+    #[arg(long, value_name = "FILE")]
+    pub align: Option<PathBuf>,
+    /// Largest time difference of frames matched for --align, in seconds
+    #[arg(long, value_name = "S", default_value_t = DEFAULT_MAX_DT, value_parser = non_negative)]
+    pub max_dt: f64,
+    /// Width and height of the images in pixels, same field of view; default: those of the data set
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(usize, usize)>,
+    /// Focal length in pixels, with the principal point in the middle; default: the camera of the data set
+    #[arg(long, value_name = "PX", value_parser = non_negative)]
+    pub focal: Option<f64>,
+    /// What the images are named by
+    #[arg(long, value_enum, default_value_t)]
+    pub names: ViewNames,
+}
+
+/// Values of `--names`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum ViewNames {
+    /// Number of the pose in its file, from 000000
+    #[default]
+    Line,
+    /// Timestamp of the pose with six decimals
+    Timestamp,
 }
 
 /// Arguments of `mba report`.

@@ -1,5 +1,7 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
+pub mod bundle;
+pub mod checkpoint;
 pub mod continuity;
 pub mod dataset;
 pub mod deblurring;
@@ -8,7 +10,9 @@ pub mod evaluation;
 pub mod exposure;
 pub mod gaussians;
 pub mod losses;
+mod png;
 pub mod raster;
+pub mod rendering;
 pub mod run;
 pub mod synth;
 mod text_lines;

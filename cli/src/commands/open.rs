@@ -3,9 +3,10 @@
 use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
-use mba_mapper::run::{Run, RunError};
+use mba_mapper::gaussians::{Gaussians, read_ply};
+use mba_mapper::run::{MAP_FILE, Run, RunError};
 
-use crate::failure::OrBadInput;
+use crate::failure::{OrBadInput, bad_input};
 
 /// Opens a data set.
 ///
@@ -25,6 +26,19 @@ pub fn run(folder: &Path) -> anyhow::Result<Run> {
         _ => "track the sequence again, or restore the file",
     };
     Run::open(folder).map_err(|error| (hint(&error), error)).or_else(advise)
+}
+
+/// Reads the map of a run.
+///
+/// # Errors
+/// Bad input with advice.
+pub fn map(run: &Run) -> anyhow::Result<Gaussians> {
+    let path = run.folder.join(MAP_FILE);
+    if !path.is_file() {
+        let message = format!("{} has no map: there is no {MAP_FILE}", run.folder.display());
+        return Err(bad_input(message, "`mba map` makes one from the data set and a tracked run"));
+    }
+    read_ply(&path).or_bad_input("restore the file, or map the sequence again")
 }
 
 fn advise<T, E>((hint, error): (&'static str, E)) -> anyhow::Result<T>

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mba_mapper::dataset::Dataset;
 use mba_mapper::deblurring::write_deblurred_keyframes;
-use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{Merit, RunCamera, RunError, RunSettings, RunWriter, Summary};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
@@ -93,6 +93,7 @@ fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
         program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
         dataset: folder.display().to_string(),
         frame_rate: dataset.calibration().frame_rate,
+        camera: Some(RunCamera::from(dataset.calibration())),
         options: values.as_object().cloned().unwrap_or_default(),
     }
 }

@@ -78,11 +78,15 @@ pub enum Readout {
 }
 
 /// A value outside its valid range.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct InvalidValue {
-    pub(super) key: &'static str,
-    pub(super) value: String,
-    pub(super) expected: &'static str,
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{key} is {value}, expected {expected}")]
+pub struct InvalidValue {
+    /// What has the value.
+    pub key: &'static str,
+    /// The value.
+    pub value: String,
+    /// What it should be.
+    pub expected: &'static str,
 }
 
 /// Largest plausible focal length in image widths: narrower than 0.6 degrees of view.
@@ -119,7 +123,7 @@ impl Calibration {
 }
 
 /// Checks size, focal lengths and principal point.
-pub(super) fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
+pub(crate) fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
     for (key, side) in [("width", camera.width), ("height", camera.height)] {
         if side == 0 || side > MAX_SIDE {
             return Err(invalid(key, side, "a size from 1 to 16384 pixels"));
@@ -143,7 +147,12 @@ pub(super) fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
     Ok(())
 }
 
-fn check_positive(key: &'static str, value: f64, expected: &'static str) -> Result<(), InvalidValue> {
+/// Checks that `value` is finite and above zero.
+pub(crate) fn check_positive(
+    key: &'static str,
+    value: f64,
+    expected: &'static str,
+) -> Result<(), InvalidValue> {
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(invalid(key, value, expected)) }
 }
 

@@ -35,7 +35,8 @@ use std::path::Path;
 
 use crate::FileError;
 pub use crate::trajectory_file::{TimedExposure, TimedPose};
-pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, Readout, Response};
+pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, Readout, Response};
+pub(crate) use calibration::{check_camera, check_positive};
 pub use error::{DatasetError, FrameError, Warning};
 pub use frame::RgbdFrame;
 pub use sequence::Dataset;

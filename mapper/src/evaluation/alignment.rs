@@ -131,7 +131,9 @@ fn check_points(reference: &[Vector3<f64>], estimate: &[Vector3<f64>]) -> Result
 }
 
 /// The rotation R that maximises `tr(R covariance^T)` and that maximum.
-fn nearest_rotation(covariance: &Matrix3<f64>) -> Result<(UnitQuaternion<f64>, f64), AlignmentError> {
+pub(super) fn nearest_rotation(
+    covariance: &Matrix3<f64>,
+) -> Result<(UnitQuaternion<f64>, f64), AlignmentError> {
     let svd = covariance.svd(true, true);
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else { return Err(AlignmentError::Degenerate) };
     let d = svd.singular_values;

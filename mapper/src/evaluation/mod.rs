@@ -8,6 +8,7 @@ mod association;
 mod exposure;
 mod figures;
 mod image;
+mod pose_alignment;
 mod statistics;
 mod structural_similarity;
 mod trajectory;
@@ -17,6 +18,7 @@ pub use association::{DEFAULT_MAX_DT, Match, associate};
 pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, blur_length, evaluate_blur, motion_of};
 pub use figures::{BlurFigures, TrajectoryFigures};
 pub use image::{DepthDifference, ImageError, depth_difference, psnr, ssim};
+pub use pose_alignment::{PoseAlignment, PoseAlignmentError, align_poses};
 pub use statistics::{Statistics, quantile, share_within};
 #[cfg(test)]
 pub(crate) use structural_similarity::mean_ssim;

@@ -1,5 +1,10 @@
 //! Parameters of Gaussians, one plane of numbers per parameter.
 
+use serde::de::{Deserialize, Deserializer, Error};
+use serde::ser::{Serialize, Serializer};
+
+use crate::checkpoint::exact_floats;
+
 /// Number of parameters of a Gaussian.
 pub const PARAMETERS: usize = 14;
 
@@ -133,6 +138,27 @@ impl FromIterator<Gaussian> for Gaussians {
         let mut all = Self::default();
         gaussians.into_iter().for_each(|gaussian| all.push(&gaussian));
         all
+    }
+}
+
+impl Serialize for Gaussians {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        #[derive(serde::Serialize)]
+        struct Plane<'a>(#[serde(with = "exact_floats")] &'a Vec<f32>);
+        self.planes.each_ref().map(Plane).serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Gaussians {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        #[derive(serde::Deserialize)]
+        struct Plane(#[serde(with = "exact_floats")] Vec<f32>);
+        let planes = <[Plane; PARAMETERS]>::deserialize(deserializer)?.map(|plane| plane.0);
+        let count = planes[0].len();
+        if planes.iter().any(|plane| plane.len() != count) {
+            return Err(D::Error::custom("the planes of a map have different lengths"));
+        }
+        Ok(Self { planes })
     }
 }
 

@@ -1,13 +1,10 @@
 //! The deblurred keyframes of a RUN folder.
 
 use std::fs;
-use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, ImageEncoder};
-
 use super::{RunError, RunWriter};
+use crate::png::encode_rgb;
 use crate::whole_file::write_together;
 
 /// Name of the folder of deblurred keyframes.
@@ -34,7 +31,7 @@ impl RunWriter {
         let path = deblurred_path(self.folder(), index);
         let folder = self.folder().join(DEBLURRED_FOLDER);
         fs::create_dir_all(&folder).map_err(|reason| RunError::unwritable(&folder, reason))?;
-        let png = png([width, height], &rgb).map_err(|reason| RunError::unwritable(&path, reason))?;
+        let png = encode_rgb([width, height], &rgb).map_err(|reason| RunError::unwritable(&path, reason))?;
         write_together(&[(path, png)]).map_err(RunError::from_write)
     }
 }
@@ -55,18 +52,6 @@ fn is_keyframe_image(path: &Path) -> bool {
     let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
     let is_number = stem.len() >= 6 && stem.bytes().all(|byte| byte.is_ascii_digit());
     is_number && path.extension().is_some_and(|extension| extension == "png")
-}
-
-fn png([width, height]: [usize; 2], rgb: &[u8]) -> io::Result<Vec<u8>> {
-    let mut png = Cursor::new(Vec::new());
-    if rgb.len() != 3 * width * height {
-        let size = format!("{} values are no image of {width} x {height} pixels", rgb.len());
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, size));
-    }
-    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
-        .write_image(rgb, width as u32, height as u32, ExtendedColorType::Rgb8)
-        .map_err(io::Error::other)?;
-    Ok(png.into_inner())
 }
 
 #[cfg(test)]

@@ -6,10 +6,12 @@
 //! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
 //! | `frames.csv` | one [`FrameRecord`] per frame |
 //! | `summary.json` | a [`Summary`] |
+//! | `map.ply` | the map, see [`crate::gaussians::read_ply`] |
 //! | `deblurred/NNNNNN.png` | the deblurred image of every keyframe, named by the index of the frame |
 //!
 //! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
 
+mod camera;
 mod deblurred;
 mod error;
 mod frame_record;
@@ -18,6 +20,7 @@ mod reader;
 mod summary;
 mod writer;
 
+pub use camera::{RunCamera, RunResponse};
 pub use deblurred::{DEBLURRED_FOLDER, deblurred_path};
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
@@ -32,5 +35,7 @@ pub const TRAJECTORY_FILE: &str = "trajectory.txt";
 pub const EXPOSURES_FILE: &str = "exposures.txt";
 /// Name of the table of frames.
 pub const FRAMES_FILE: &str = "frames.csv";
+/// Name of the map.
+pub const MAP_FILE: &str = "map.ply";
 /// Name of the summary.
 pub const SUMMARY_FILE: &str = "summary.json";

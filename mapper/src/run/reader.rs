@@ -33,8 +33,11 @@ impl Run {
         }
         let json = fs::read_to_string(&path)
             .map_err(|reason| FileError::Unreadable { path: path.clone(), reason })?;
-        let summary = serde_json::from_str(&json)
-            .map_err(|error| RunError::MalformedSummary { path, message: error.to_string() })?;
+        let malformed = |message| RunError::MalformedSummary { path: path.clone(), message };
+        let summary: Summary = serde_json::from_str(&json).map_err(|error| malformed(error.to_string()))?;
+        if let Some(camera) = &summary.settings.camera {
+            camera.check().map_err(|error| malformed(format!("camera: {error}")))?;
+        }
         Ok(Self {
             folder: folder.to_owned(),
             summary,
@@ -46,6 +49,7 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{RunCamera, RunSettings, RunWriter};
     use super::*;
 
     #[test]
@@ -53,6 +57,18 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let error = Run::open(folder.path()).unwrap_err();
         assert!(error.to_string().ends_with("is not a run folder: it has no summary.json"), "{error}");
+    }
+
+    #[test]
+    fn a_bad_camera_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let camera = Some(RunCamera { fx: 0.0, ..RunCamera::simple(64, 48, 50.0) });
+        let (program, dataset) = (String::new(), String::new());
+        let settings =
+            RunSettings { program, dataset, frame_rate: 30.0, camera, options: Default::default() };
+        RunWriter::create(folder.path(), settings).unwrap();
+        let message = Run::open(folder.path()).unwrap_err().to_string();
+        assert!(message.contains("summary.json: camera: fx is 0, expected a focal length"), "{message}");
     }
 
     #[test]

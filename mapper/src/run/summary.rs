@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{FrameRecord, FrameStatus};
+use super::{FrameRecord, FrameStatus, RunCamera};
 use crate::evaluation::{BlurFigures, TrajectoryFigures, quantile};
 
 /// Version of the summary's layout.
@@ -17,6 +17,9 @@ pub struct RunSettings {
     pub dataset: String,
     /// Frames per second of the data set: one over it is the time a frame may take.
     pub frame_rate: f64,
+    /// Camera of the data set; absent in runs of old versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<RunCamera>,
     /// Options of the command by name.
     pub options: serde_json::Map<String, serde_json::Value>,
 }

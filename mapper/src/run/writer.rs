@@ -171,12 +171,13 @@ mod tests {
     use mba_tracker::geometry::RigidTransform;
     use nalgebra::Vector3;
 
-    use super::super::{FrameStatus, Run};
+    use super::super::{FrameStatus, Run, RunCamera};
     use super::*;
 
     fn settings() -> RunSettings {
         let options = serde_json::Map::from_iter([("virtual_views".to_owned(), 8.into())]);
-        RunSettings { program: "mba test".into(), dataset: "data".into(), frame_rate: 30.0, options }
+        let camera = Some(RunCamera::simple(640, 480, 1.0 / 3.0));
+        RunSettings { program: "mba test".into(), dataset: "data".into(), frame_rate: 30.0, camera, options }
     }
 
     fn frame(k: usize, status: FrameStatus) -> (TimedExposure, FrameRecord) {

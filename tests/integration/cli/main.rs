@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod keyframes;
+mod render;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

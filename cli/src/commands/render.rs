@@ -1,0 +1,199 @@
+//! `mba render`.
+
+use std::fs;
+use std::path::Path;
+use std::time::Instant;
+
+use mba_mapper::evaluation::{PoseAlignment, align_poses};
+use mba_mapper::gaussians::Gaussians;
+use mba_mapper::rendering::{RenderedView, ViewRenderer};
+use mba_mapper::run::{FrameStatus, MAP_FILE, Run, RunCamera, Spread, mid_pose};
+use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
+use serde::Serialize;
+
+use super::open;
+use crate::args::{Render, ViewNames};
+use crate::console::Console;
+use crate::failure::{OrBadInput, bad_input, is_disk_full};
+use crate::report::table::{pairs, percent};
+
+/// What is printed.
+#[derive(Clone, Debug, Serialize)]
+struct Written {
+    folder: String,
+    views: usize,
+    width: usize,
+    height: usize,
+    gaussians: usize,
+    /// Time to render and encode a view, without writing files, milliseconds.
+    milliseconds_per_view: Option<Spread>,
+    /// Share (0 to 1) of all pixels with an alpha above one half.
+    solid_share: f64,
+    alignment: Option<AlignmentFigures>,
+}
+
+/// How well the trajectory of the run agrees with the file of `--align`.
+#[derive(Clone, Debug, Serialize)]
+struct AlignmentFigures {
+    matches: usize,
+    rotation_rms_deg: f64,
+    translation_rms_m: f64,
+}
+
+/// Renders every pose of a file to a colour and a depth image.
+///
+/// # Errors
+/// Bad input when run, poses or camera cannot be used; failure when the images cannot be written.
+pub fn run(args: &Render, console: &Console) -> anyhow::Result<()> {
+    let run = open::run(&args.run)?;
+    let map = open::map(&run)?;
+    let camera = camera(&run, args)?;
+    let poses = poses(&args.poses)?;
+    let alignment = args.align.as_ref().map(|file| align(&run, file, args.max_dt)).transpose()?;
+    if map.is_empty() {
+        console.warning(format!(
+            "{} holds no Gaussians: all views are empty",
+            run.folder.join(MAP_FILE).display()
+        ));
+    }
+    let poses = in_map_frame(&poses, alignment.as_ref());
+    let written = render_all(&map, &camera, &poses, args, console)?;
+    console.result(&Written { alignment: alignment.as_ref().map(AlignmentFigures::from), ..written }, table)
+}
+
+/// The run's camera, or the one that the options describe.
+fn camera(run: &Run, args: &Render) -> anyhow::Result<RunCamera> {
+    let camera = match (&run.summary.settings.camera, args.size, args.focal) {
+        (Some(camera), size, focal) => {
+            let sized = size.map_or_else(|| camera.clone(), |(width, height)| camera.resized(width, height));
+            focal.map_or_else(|| sized.clone(), |focal| sized.refocused(focal))
+        }
+        (None, Some((width, height)), Some(focal)) => RunCamera::simple(width, height, focal),
+        (None, ..) => {
+            let message = format!("{} does not tell its camera", run.folder.display());
+            return Err(bad_input(message, "give --size and --focal, or make the run again"));
+        }
+    };
+    camera.check().or_bad_input("correct --size or --focal")?;
+    Ok(camera)
+}
+
+fn poses(path: &Path) -> anyhow::Result<Vec<TimedPose>> {
+    let poses = read_trajectory(path).or_bad_input("--poses needs lines `timestamp tx ty tz qx qy qz qw`")?;
+    if poses.is_empty() {
+        let message = format!("{} holds no poses", path.display());
+        return Err(bad_input(message, "it needs a line `timestamp tx ty tz qx qy qz qw` for every view"));
+    }
+    Ok(poses)
+}
+
+/// Aligns the frames of the run that were not lost with the trajectory in `file`.
+fn align(run: &Run, file: &Path, max_dt: f64) -> anyhow::Result<PoseAlignment> {
+    let reference =
+        read_trajectory(file).or_bad_input("--align needs lines `timestamp tx ty tz qx qy qz qw`")?;
+    let frames = run.exposures.iter().zip(&run.frames);
+    let tracked: Vec<TimedPose> = frames
+        .filter(|(_, record)| record.status != FrameStatus::Lost)
+        .map(|(exposure, _)| mid_pose(exposure))
+        .collect();
+    align_poses(&reference, &tracked, max_dt).or_bad_input(
+        "--align needs a trajectory of the same recording; --max-dt is the time difference allowed",
+    )
+}
+
+fn in_map_frame(poses: &[TimedPose], alignment: Option<&PoseAlignment>) -> Vec<TimedPose> {
+    let Some(alignment) = alignment else { return poses.to_vec() };
+    let map_from_reference = alignment.reference_from_estimate.inverse();
+    let carry = |pose: &TimedPose| TimedPose {
+        timestamp: pose.timestamp,
+        world_from_camera: map_from_reference.compose(&pose.world_from_camera),
+    };
+    poses.iter().map(carry).collect()
+}
+
+fn render_all(
+    map: &Gaussians,
+    camera: &RunCamera,
+    poses: &[TimedPose],
+    args: &Render,
+    console: &Console,
+) -> anyhow::Result<Written> {
+    let depth_folder = args.out.join("depth");
+    fs::create_dir_all(&depth_folder)
+        .map_err(|reason| format!("cannot create {}: {reason}", depth_folder.display()))
+        .or_bad_input("name a folder for --out that can be created")?;
+    let mut renderer =
+        ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
+    let progress = console.progress(poses.len(), "rendering");
+    let mut times = Vec::with_capacity(poses.len());
+    let mut solid = 0.0;
+    for (index, pose) in poses.iter().enumerate() {
+        let start = Instant::now();
+        let view = renderer.render(&pose.world_from_camera);
+        times.push(1e3 * start.elapsed().as_secs_f64());
+        solid += view.solid / poses.len() as f64;
+        write(&view, &args.out, &depth_folder, &name(args.names, index, pose))?;
+        progress.inc(1);
+    }
+    progress.finish_and_clear();
+    Ok(Written {
+        folder: args.out.display().to_string(),
+        views: poses.len(),
+        width: camera.width,
+        height: camera.height,
+        gaussians: map.len(),
+        milliseconds_per_view: Spread::of(&times),
+        solid_share: solid,
+        alignment: None,
+    })
+}
+
+fn write(view: &RenderedView, colour: &Path, depth: &Path, name: &str) -> anyhow::Result<()> {
+    match view.write(&colour.join(name), &depth.join(name)) {
+        Err(error) if !is_disk_full(&error) => {
+            Err(error).or_bad_input("name a folder for --out that can be written")
+        }
+        other => Ok(other?),
+    }
+}
+
+fn name(names: ViewNames, index: usize, pose: &TimedPose) -> String {
+    match names {
+        ViewNames::Line => format!("{index:06}.png"),
+        ViewNames::Timestamp => format!("{:.6}.png", pose.timestamp),
+    }
+}
+
+impl From<&PoseAlignment> for AlignmentFigures {
+    fn from(alignment: &PoseAlignment) -> Self {
+        Self {
+            matches: alignment.matches,
+            rotation_rms_deg: alignment.rotation_rms.to_degrees(),
+            translation_rms_m: alignment.translation_rms,
+        }
+    }
+}
+
+fn table(written: &Written) -> String {
+    let mut rows = vec![
+        ("views", format!("{} of {} x {} pixels", written.views, written.width, written.height)),
+        ("Gaussians", written.gaussians.to_string()),
+        ("pixels showing the map", percent(written.solid_share)),
+    ];
+    rows.extend(
+        written
+            .milliseconds_per_view
+            .iter()
+            .map(|ms| ("time per view", format!("median {:.1} ms", ms.median))),
+    );
+    if let Some(alignment) = &written.alignment {
+        let AlignmentFigures { matches, rotation_rms_deg, translation_rms_m } = alignment;
+        let left = format!(
+            "{matches} frames, {rotation_rms_deg:.2} deg and {:.2} cm left (RMS)",
+            100.0 * translation_rms_m
+        );
+        rows.push(("aligned", left));
+    }
+    rows.push(("written to", written.folder.clone()));
+    pairs(&rows)
+}

@@ -55,5 +55,6 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Track(args) => commands::track::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
+        Command::Eval(EvalCommand::Images(args)) => commands::eval_images::run(args, console),
     }
 }

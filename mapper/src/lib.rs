@@ -5,6 +5,7 @@ pub mod deblurring;
 mod error;
 pub mod evaluation;
 pub mod gaussians;
+pub mod image_folders;
 pub mod losses;
 pub mod raster;
 pub mod run;

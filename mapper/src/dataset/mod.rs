@@ -38,6 +38,7 @@ pub use crate::trajectory_file::{TimedExposure, TimedPose};
 pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, Readout, Response};
 pub use error::{DatasetError, FrameError, Warning};
 pub use frame::RgbdFrame;
+pub(crate) use frame::read_image;
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
 

@@ -17,9 +17,8 @@ pub fn folders(figures: &FolderFigures) -> String {
         text += &depth(figures);
     }
     text + &pairs(&[
-        ("without partner", String::new()),
-        ("  in the reference", figures.unpaired.reference.to_string()),
-        ("  in the estimate", figures.unpaired.estimate.to_string()),
+        ("only in the reference", figures.unpaired.reference.to_string()),
+        ("only in the estimate", figures.unpaired.estimate.to_string()),
     ])
 }
 
@@ -41,7 +40,8 @@ fn colour_row(name: &str, estimate: &ImageFigures, captured: Option<&ImageFigure
     // Writing to a string cannot fail.
     let mut text = format!("{name:24}{psnr_db:>12.2}{ssim:>12.4}");
     if let Some(captured) = captured {
-        let gain = psnr_db - captured.psnr_db;
+        // Both are infinite where both images equal the reference.
+        let gain = if *psnr_db == captured.psnr_db { 0.0 } else { psnr_db - captured.psnr_db };
         let _ = write!(text, "{:>16.2}{:>12.4}{gain:>+12.2}", captured.psnr_db, captured.ssim);
     }
     text + "\n"
@@ -81,7 +81,7 @@ mod tests {
         let cells = |row: usize| text.lines().nth(row).unwrap_or_default().split_whitespace();
         assert!(cells(1).eq(["000012", "30.25", "0.3025", "27.00", "0.2700", "+3.25"]), "{text}");
         assert!(cells(2).eq(["mean", "30.25", "0.3025", "27.00", "0.2700", "+3.25"]), "{text}");
-        assert!(cells(5).eq(["in", "the", "reference", "3"]), "{text}");
+        assert!(cells(4).eq(["only", "in", "the", "reference", "3"]), "{text}");
     }
 
     #[test]

@@ -343,6 +343,8 @@ pub struct Report {
 pub enum EvalCommand {
     /// Trajectory errors (ATE, RPE) as the evo package defines them, and blur figures
     Trajectory(EvalTrajectory),
+    /// PSNR and SSIM of images, and differences of depth maps, against true ones of the same name
+    Images(EvalImages),
 }
 
 /// Arguments of `mba eval trajectory`.
@@ -373,6 +375,33 @@ pub struct EvalTrajectory {
     pub dataset: Option<PathBuf>,
 }
 
+/// Arguments of `mba eval images`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Images are paired by their names without extension; .png and .jpg are read. Colour images get PSNR and SSIM \
+(of display values, as published figures are), 16-bit images with one channel are depth maps and get the mean \
+absolute difference where both have depth. With --captured the frame of the data set that has the number in \
+the image's name is compared with the reference too, which shows what deblurring gained. In JSON the PSNR of \
+equal images is null.
+
+Examples:
+  mba eval images --reference data/sharp --estimate run/deblurred --captured data
+  mba eval images --reference data/depth --estimate run/depth --depth-scale 5000")]
+pub struct EvalImages {
+    /// Folder of the true images
+    #[arg(long, value_name = "DIR")]
+    pub reference: PathBuf,
+    /// Folder of the images to judge
+    #[arg(long, value_name = "DIR")]
+    pub estimate: PathBuf,
+    /// Data set of the captured frames, if images are named by the index of their frame
+    #[arg(long, value_name = "DATASET")]
+    pub captured: Option<PathBuf>,
+    /// Raw units per metre of depth maps; 0 is missing
+    #[arg(long, value_name = "UNITS", default_value_t = 5000.0, value_parser = positive)]
+    pub depth_scale: f64,
+}
+
 /// Names of [`Alignment`] on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum AlignMode {
@@ -400,6 +429,14 @@ fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
         _ => Err("a number that is not negative is needed".to_owned()),
+    }
+}
+
+/// A finite number above zero.
+fn positive(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
+        _ => Err("a number above zero is needed".to_owned()),
     }
 }
 

@@ -56,5 +56,6 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Render(args) => commands::render::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
+        Command::Eval(EvalCommand::Images(args)) => commands::eval_images::run(args, console),
     }
 }

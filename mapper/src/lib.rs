@@ -9,6 +9,7 @@ mod error;
 pub mod evaluation;
 pub mod exposure;
 pub mod gaussians;
+pub mod image_folders;
 pub mod losses;
 mod png;
 pub mod raster;

@@ -1,6 +1,7 @@
 //! One file per command.
 
 pub mod demo;
+pub mod eval_images;
 pub mod eval_trajectory;
 pub mod info;
 pub mod open;

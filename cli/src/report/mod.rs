@@ -3,6 +3,7 @@
 mod chart;
 mod compare;
 mod html;
+pub mod image_table;
 mod pictures;
 mod plots;
 pub mod table;

@@ -58,11 +58,29 @@ pub(super) fn image_size(path: &Path) -> Option<(usize, usize)> {
     Some((width as usize, height as usize))
 }
 
+/// Decodes an image of any size and pixel type.
+pub(crate) fn read_image(path: &Path) -> Result<DynamicImage, FrameError> {
+    decode_checked(path, |_, _| Ok(()))
+}
+
 /// Decodes an image after its size and `check` of its pixel type have been found good.
 fn decode(
     path: &Path,
     size: (usize, usize),
     check: impl Fn(ColorType) -> Result<(), FrameError>,
+) -> Result<DynamicImage, FrameError> {
+    decode_checked(path, |found, colour_type| {
+        if found != size {
+            return Err(FrameError::SizeMismatch { path: path.to_owned(), found, expected: size });
+        }
+        check(colour_type)
+    })
+}
+
+/// Decodes an image after `check` has found its size and pixel type good.
+fn decode_checked(
+    path: &Path,
+    check: impl Fn((usize, usize), ColorType) -> Result<(), FrameError>,
 ) -> Result<DynamicImage, FrameError> {
     let damaged = |reason: String| {
         // Some decoders break their messages into lines.
@@ -78,11 +96,7 @@ fn decode(
     }
     let decoder = reader.into_decoder().map_err(|error| damaged(error.to_string()))?;
     let (width, height) = decoder.dimensions();
-    let found = (width as usize, height as usize);
-    if found != size {
-        return Err(FrameError::SizeMismatch { path: path.to_owned(), found, expected: size });
-    }
-    check(decoder.color_type())?;
+    check((width as usize, height as usize), decoder.color_type())?;
     DynamicImage::from_decoder(decoder).map_err(|error| damaged(error.to_string()))
 }
 

@@ -39,6 +39,7 @@ pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, Inval
 pub(crate) use calibration::{check_camera, check_positive};
 pub use error::{DatasetError, FrameError, Warning};
 pub use frame::RgbdFrame;
+pub(crate) use frame::read_image;
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
 

@@ -25,6 +25,7 @@ fn every_command_has_help_with_an_example() {
         assert_has_example(&mba([command, "--help"]).stdout, &format!("  mba {command}"));
     }
     assert_has_example(&mba(["eval", "trajectory", "--help"]).stdout, "  mba eval trajectory");
+    assert_has_example(&mba(["eval", "images", "--help"]).stdout, "  mba eval images");
 }
 
 fn assert_has_example(help: &str, call: &str) {

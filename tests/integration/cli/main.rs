@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod eval_images;
 mod keyframes;
 mod render;
 

@@ -10,6 +10,7 @@ pub mod evaluation;
 pub mod exposure;
 pub mod gaussians;
 pub mod image_folders;
+pub mod infill;
 pub mod losses;
 mod png;
 pub mod raster;

@@ -29,30 +29,36 @@ pub struct StepLengths {
     pub colour: f32,
 }
 
-/// First and second moments of the gradients of a set of Gaussians, and how often each was updated.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Moments {
-    /// Means of gradients.
-    pub first: Gaussians,
-    /// Means of squared gradients.
-    pub second: Gaussians,
-    /// Number of updates, per Gaussian.
-    pub updates: Vec<u32>,
-}
-
-impl Moments {
-    /// No moments for `count` Gaussians.
+impl StepLengths {
+    /// All lengths times `factor`.
     #[must_use]
-    pub fn zeros(count: usize) -> Self {
-        Self { first: Gaussians::zeros(count), second: Gaussians::zeros(count), updates: vec![0; count] }
+    pub(super) fn scaled(&self, factor: f32) -> Self {
+        Self {
+            mean: self.mean * factor,
+            log_scale: self.log_scale * factor,
+            rotation: self.rotation * factor,
+            opacity: self.opacity * factor,
+            colour: self.colour * factor,
+        }
     }
 }
 
-/// Moves the Gaussians for which `drawn` says so one step against `gradient`.
-pub fn step(
+/// First and second moments of the gradients of a set of Gaussians, and how often each was updated.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Moments {
+    /// Means of gradients.
+    pub(super) first: Gaussians,
+    /// Means of squared gradients.
+    pub(super) second: Gaussians,
+    /// Number of updates, per Gaussian.
+    pub(super) updates: Vec<u32>,
+}
+
+/// Moves the Gaussians that are marked in `drawn` one step against `gradient`.
+pub(super) fn step(
     gaussians: &mut Gaussians,
     gradient: &Gaussians,
-    drawn: &(dyn Fn(usize) -> bool + Sync),
+    drawn: &[bool],
     lengths: &StepLengths,
     moments: &mut Moments,
 ) {
@@ -81,14 +87,14 @@ fn step_piece(
     start: usize,
     values: &mut PlanesMut<'_>,
     gradient: &Gaussians,
-    drawn: &(dyn Fn(usize) -> bool + Sync),
+    drawn: &[bool],
     lengths: &StepLengths,
     first: &mut PlanesMut<'_>,
     second: &mut PlanesMut<'_>,
     counts: &mut [u32],
 ) {
     for i in 0..values.len() {
-        if !drawn(start + i) {
+        if !drawn.get(start + i).copied().unwrap_or(false) {
             continue;
         }
         counts[i] += 1;

@@ -1,20 +1,34 @@
-//! Joint optimisation of the map and of the exposure trajectories.
+//! Joint optimisation of the map and of the paths of all exposures.
 
-use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
-use mba_tracker::trajectory::ExposureTrajectory;
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+use serde::{Deserialize, Serialize};
 
-use super::adam::{self, Moments, StepLengths};
+use super::adam::{self, Moments};
 use super::density::{self, Pull};
-use super::display::DisplayCurve;
-use super::keyframe::{ObservationPyramid, Sensor};
-use super::loss::{DisplayPlanes, LossTerms, LossWeights, compare_depth};
-use super::pose_step::{PoseMoments, PoseUnits};
+use super::engine::{Engine, Exposure};
+use super::frame_state::FrameState;
+use super::loss::LossTerms;
+use super::observation::{Observation, ObservationPyramid, Sensor};
+use super::path_step::{PathPrior, PathStep, PathUnits};
+use super::schedule::{Schedule, StepPlan};
 use super::seeding;
-use crate::exposure::{ExposureRenderer, ExposureScratch};
 use crate::gaussians::Gaussians;
-use crate::losses::Ssim;
-use crate::raster::{GaussianGradients, RasterImage, RasterScratch, RasterView, Rasterizer};
+use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
+
+/// How the bundle is adjusted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BundleSettings {
+    /// Whether motion during the exposure is modelled.
+    pub blur: bool,
+    /// Upper bound of virtual views per exposure.
+    pub max_views: usize,
+    /// Upper bound of the number of Gaussians.
+    pub max_gaussians: usize,
+    /// Seed of the order in which keyframes are visited.
+    pub seed: u64,
+}
 
 /// A frame that the map is fitted to.
 #[derive(Clone, Debug)]
@@ -23,174 +37,234 @@ pub struct Keyframe {
     pub index: usize,
     /// What was captured.
     pub observation: ObservationPyramid,
-    /// `world_from_camera` at both ends of the exposure.
-    pub path: ExposureTrajectory,
-    /// Logarithm of the gain on the map's light.
-    pub log_gain: f64,
-    /// Length of the blur at full resolution, pixels.
-    pub blur_px: f64,
-    /// Moments of the pose's gradients.
-    pub moments: PoseMoments,
+    /// What is known of its path besides.
+    pub prior: PathPrior,
+    /// Typical depth, metres.
+    pub depth: f64,
 }
 
-/// How one step is made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepPlan {
-    /// Resolution, 0 is full.
-    pub level: usize,
-    /// Distance of virtual views along the blur, pixels of the level.
-    pub spacing: f64,
-    /// Most virtual views.
-    pub max_views: usize,
-    /// Step lengths of the Gaussians.
-    pub lengths: StepLengths,
-    /// Step length of poses, pixels at full resolution; 0 leaves poses alone.
-    pub pose_pixels: f64,
-    /// Weights of the losses.
-    pub weights: LossWeights,
-}
-
-/// Everything that one step needs besides the state.
-pub struct BundleAdjustment {
+/// All that changes from step to step: enough to go on after an interruption.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BundleState {
     /// The map.
     pub gaussians: Gaussians,
     /// Moments of its gradients.
-    pub moments: Moments,
+    moments: Moments,
     /// Pulls since the last change of density.
-    pub pull: Pull,
-    /// The frames.
-    pub keyframes: Vec<Keyframe>,
-    sensor: Sensor,
-    curve: DisplayCurve,
-    renderer: ExposureRenderer,
-    rasterizer: Rasterizer,
-    scratch: ExposureScratch,
-    mid_scratch: RasterScratch,
-    image: RasterImage,
-    by_image: RasterImage,
-    planes: DisplayPlanes,
-    ssim: Ssim,
-    gradients: GaussianGradients,
+    pull: Pull,
+    /// One per keyframe.
+    pub frames: Vec<FrameState>,
+    /// Steps made.
+    pub steps: usize,
+    /// Where the schedule stands, 0 to 1.
+    pub position: f64,
 }
 
+/// A map, keyframes, and what is needed to fit the one to the other.
+#[derive(Debug)]
+pub struct BundleAdjustment {
+    /// What was estimated so far.
+    pub state: BundleState,
+    keyframes: Vec<Keyframe>,
+    settings: BundleSettings,
+    schedule: Schedule,
+    sensor: Sensor,
+    engine: Engine,
+    /// Order of the visits of the current round, and which round that is.
+    round: (usize, Vec<usize>),
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// The keyframe, counted from 0.
+    pub keyframe: usize,
+    /// Loss before the step.
+    pub terms: LossTerms,
+}
+
+/// Longest growth of the map at one change of density, as a fraction of its size.
+const GROWTH: f64 = 0.15;
+
 impl BundleAdjustment {
-    /// Prepares for keyframes of one sensor, with an empty map.
+    /// Keyframes of one sensor with first estimates of their states, and an empty map; [`Self::seed`] fills it.
+    ///
+    /// Keyframes without a state are left out.
     #[must_use]
-    pub fn new(level: Level, sensor: Sensor, keyframes: Vec<Keyframe>) -> Self {
-        let curve = DisplayCurve::new(&sensor.inverse_response);
-        Self {
+    pub fn new(
+        level: Level,
+        sensor: Sensor,
+        settings: BundleSettings,
+        keyframes: Vec<Keyframe>,
+        frames: Vec<FrameState>,
+    ) -> Self {
+        let engine = Engine::new(level, &sensor);
+        let schedule = Schedule::new(keyframes.len());
+        let state = BundleState {
             gaussians: Gaussians::default(),
             moments: Moments::default(),
             pull: Pull::default(),
-            keyframes,
-            sensor,
-            curve,
-            renderer: ExposureRenderer::new(level),
-            rasterizer: Rasterizer::new(level),
-            scratch: ExposureScratch::default(),
-            mid_scratch: RasterScratch::default(),
-            image: RasterImage::default(),
-            by_image: RasterImage::default(),
-            planes: DisplayPlanes::default(),
-            ssim: Ssim::new(level),
-            gradients: GaussianGradients::default(),
-        }
+            frames,
+            steps: 0,
+            position: 0.0,
+        };
+        Self { state, keyframes, settings, schedule, sensor, engine, round: (usize::MAX, Vec::new()) }
     }
 
-    /// Number of virtual views of keyframe `k` under a plan; odd.
+    /// The keyframes.
     #[must_use]
-    pub fn views(&self, k: usize, plan: &StepPlan) -> usize {
-        let blur = self.keyframes[k].blur_px / (1_usize << plan.level) as f64;
-        ((blur / plan.spacing).ceil() as usize).clamp(1, plan.max_views.max(1)) | 1
+    pub fn keyframes(&self) -> &[Keyframe] {
+        &self.keyframes
     }
 
-    /// Adds Gaussians where keyframe `k` sees something that the map does not have.
-    pub fn seed(&mut self, k: usize, level: usize, room: usize) -> usize {
-        let keyframe = &self.keyframes[k];
-        let seen = keyframe.observation.level(level);
-        let middle = keyframe.path.mid();
-        let view = RasterView { camera: seen.camera, world_from_camera: middle, background: [0.0; 3] };
-        self.rasterizer.forward(&self.gaussians, &view, &mut self.mid_scratch, &mut self.image);
-        let response = &self.sensor.inverse_response;
-        let added = seeding::seed(&mut self.gaussians, seen, response, &middle, &self.image.alpha, room);
-        density::resize(&mut self.moments, self.gaussians.len());
-        self.pull = Pull::zeros(self.gaussians.len());
-        added
+    /// The schedule.
+    #[must_use]
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
     }
 
-    /// Renders the sharp view of a pose at full resolution.
-    pub fn render(&mut self, world_from_camera: &RigidTransform, image: &mut RasterImage) {
-        let view =
-            RasterView { camera: self.sensor.camera, world_from_camera: *world_from_camera, background: [0.0; 3] };
-        self.rasterizer.forward(&self.gaussians, &view, &mut self.mid_scratch, image);
-    }
-
-    /// One step on keyframe `k`.
-    pub fn step(&mut self, k: usize, plan: &StepPlan) -> LossTerms {
-        let views = self.views(k, plan);
-        let keyframe = &mut self.keyframes[k];
-        let seen = keyframe.observation.level(plan.level);
-        let gain = keyframe.log_gain.exp() as f32;
-        let (camera, path) = (&seen.camera, &keyframe.path);
-        self.renderer.forward(
-            &self.gaussians,
-            camera,
-            path,
-            views,
-            [0.0; 3],
-            &mut self.scratch,
-            &mut self.image,
-        );
-        self.by_image.resize(camera.width, camera.height);
-        let mut terms =
-            self.planes.compare(&self.curve, gain, &self.image, seen, plan.weights.colour);
-        if plan.weights.similarity > 0.0 {
-            let DisplayPlanes { rendered, captured, gradient, .. } = &mut self.planes;
-            
-            
-            let value = self.ssim.add_gradient(
-                [camera.width, camera.height],
-                captured.each_ref().map(Vec::as_slice),
-                rendered.each_ref().map(Vec::as_slice),
-                -plan.weights.similarity,
-                gradient.each_mut().map(Vec::as_mut_slice),
-            );
-            terms.similarity = f64::from(plan.weights.similarity) * (1.0 - value);
+    /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover.
+    pub fn seed(&mut self) {
+        let camera = self.sensor.camera;
+        let blur = |k: &usize| self.state.frames[*k].blur_px(&camera, self.keyframes[*k].depth);
+        let mut order: Vec<usize> = (0..self.keyframes.len()).collect();
+        order.sort_by(|a, b| blur(a).total_cmp(&blur(b)));
+        let rasterizer = Rasterizer::new(Level::new());
+        let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
+        for k in order {
+            let seen = self.keyframes[k].observation.level(0);
+            let world_from_camera = self.state.frames[k].path.mid();
+            let view = RasterView { camera: seen.camera, world_from_camera, background: [0.0; 3] };
+            rasterizer.forward(&self.state.gaussians, &view, &mut scratch, &mut image);
+            let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
+            let response = &self.sensor.inverse_response;
+            seeding::seed(&mut self.state.gaussians, seen, response, &world_from_camera, &image.alpha, room);
         }
-        let by_gain = self.planes.gradient_by_light(gain, &self.image, &mut self.by_image);
-        terms.depth = compare_depth(&self.image, seen, &plan.weights, &mut self.by_image);
-        self.gradients.reset(self.gaussians.len());
-        let by_path =
-            self.renderer.backward(&self.gaussians, &self.by_image, &mut self.scratch, &mut self.gradients);
-        let scratch = &self.scratch;
-        adam::step(
-            &mut self.gaussians,
-            &self.gradients.parameters,
-            &|i| scratch.is_drawn(i),
-            &plan.lengths,
-            &mut self.moments,
-        );
-        self.pull.add(&self.gradients.screen, |i| scratch.is_drawn(i));
-        let _ = by_gain;
-        if plan.pose_pixels > 0.0 {
-            let units = PoseUnits { metres: 3.0 / self.sensor.camera.fx, radians: 1.0 / self.sensor.camera.fx };
-            keyframe.moments.step(&mut keyframe.path, &by_path, units, plan.pose_pixels, false);
-        }
-        terms
-    }
-
-    /// Changes the density: divides at most `room` Gaussians, removes those that do nothing, restores the order.
-    pub fn change_density(&mut self, threshold: f32, room: usize) -> [usize; 2] {
-        let divided = density::divide(&mut self.gaussians, &mut self.moments, &self.pull, threshold, room);
-        let pruned = density::prune(&mut self.gaussians, &mut self.moments);
+        density::resize(&mut self.state.moments, self.state.gaussians.len());
         self.reorder();
-        [divided, pruned]
+    }
+
+    /// One step on the next keyframe, after which the schedule stands at `position_after`. `timed` says whether
+    /// positions are shares of time.
+    ///
+    /// Returns `None` without keyframes.
+    pub fn step(&mut self, timed: bool, position_after: impl FnOnce(&Schedule) -> f64) -> Option<StepReport> {
+        let k = self.next_keyframe()?;
+        let plan = self.schedule.plan(self.state.position, timed);
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let seen = keyframe.observation.level(plan.level);
+        let views = self.settings.views(frame.blur_px(&seen.camera, keyframe.depth), &plan);
+        let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
+        let loss = self.engine.evaluate(&self.state.gaussians, exposure, &plan);
+
+        let state = &mut self.state;
+        let (gradients, drawn) = (self.engine.gradients(), self.engine.drawn());
+        adam::step(&mut state.gaussians, &gradients.parameters, drawn, &plan.lengths, &mut state.moments);
+        state.pull.add(&gradients.screen, drawn);
+        let frame = &mut state.frames[k];
+        // The first keyframe says where the world is and how bright.
+        let is_first = k == 0;
+        if plan.path_pixels > 0.0 {
+            let units = path_units(&self.sensor, keyframe.depth);
+            let step =
+                PathStep { pixels: plan.path_pixels, hold_middle: is_first, still: !self.settings.blur };
+            frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, units, step);
+            if !is_first {
+                frame.log_gain += frame.gain_moments.step(loss.by_log_gain, plan.log_gain);
+            }
+        }
+        state.steps += 1;
+        let before = core::mem::replace(&mut state.position, position_after(&self.schedule));
+        if self.schedule.density_changes(before, self.state.position) {
+            self.change_density();
+        }
+        Some(StepReport { keyframe: k, terms: loss.terms })
+    }
+
+    /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution.
+    pub fn fit_frame(
+        &mut self,
+        observation: &ObservationPyramid,
+        depth: f64,
+        prior: &PathPrior,
+        frame: &mut FrameState,
+        count: usize,
+    ) {
+        let plan = StepPlan { level: 1, spacing: 2.0, ..self.schedule.plan(0.1, false) };
+        let seen = observation.level(plan.level);
+        let units = path_units(&self.sensor, depth);
+        for k in 0..count {
+            let shrink = 0.05_f64.powf(k as f64 / count as f64);
+            let views = self.settings.views(frame.blur_px(&seen.camera, depth), &plan);
+            let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
+            let loss = self.engine.evaluate(&self.state.gaussians, exposure, &plan);
+            let step = PathStep { pixels: 0.3 * shrink, hold_middle: false, still: !self.settings.blur };
+            frame.path_moments.step(&mut frame.path, &loss.by_path, prior, units, step);
+            frame.log_gain += frame.gain_moments.step(loss.by_log_gain, 0.01 * shrink);
+        }
+    }
+
+    /// The next keyframe of a random order in which every keyframe comes once per round.
+    fn next_keyframe(&mut self) -> Option<usize> {
+        let count = self.keyframes.len().min(self.state.frames.len());
+        let (round, place) = (self.state.steps.checked_div(count)?, self.state.steps % count);
+        if self.round.0 != round {
+            self.round = (round, shuffled(count, self.settings.seed, round));
+        }
+        self.round.1.get(place).copied()
+    }
+
+    fn change_density(&mut self) {
+        let state = &mut self.state;
+        let count = state.gaussians.len();
+        let room = self.settings.max_gaussians.saturating_sub(count).min((GROWTH * count as f64) as usize);
+        density::divide(&mut state.gaussians, &mut state.moments, &state.pull, room);
+        density::prune(&mut state.gaussians, &mut state.moments);
+        self.reorder();
     }
 
     /// Puts neighbours in space next to each other in memory.
-    pub fn reorder(&mut self) {
-        let order = density::morton_order(&self.gaussians);
-        density::select(&mut self.gaussians, &mut self.moments, &order);
-        self.pull = Pull::zeros(self.gaussians.len());
+    fn reorder(&mut self) {
+        let state = &mut self.state;
+        let order = density::morton_order(&state.gaussians);
+        density::select(&mut state.gaussians, &mut state.moments, &order);
+        state.pull = Pull::zeros(state.gaussians.len());
     }
+}
+
+impl BundleSettings {
+    /// Number of virtual views for a blur length in pixels of the plan's resolution; odd.
+    fn views(&self, blur_px: f64, plan: &StepPlan) -> usize {
+        let most = if self.blur { plan.max_views.min(self.max_views) } else { 1 };
+        // Casts saturate. An even bound gives the odd number below.
+        let wanted = ((blur_px / plan.spacing).ceil() as usize).max(1) | 1;
+        wanted.min(most.saturating_sub(1) | 1)
+    }
+}
+
+/// Typical depth of an observation, metres; 2 where nothing was measured.
+#[must_use]
+pub fn typical_depth(seen: &Observation) -> f64 {
+    let mut depths: Vec<f32> = seen.depth.iter().copied().filter(|depth| *depth > 0.0).step_by(7).collect();
+    if depths.is_empty() {
+        return 2.0;
+    }
+    let middle = depths.len() / 2;
+    f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+fn path_units(sensor: &Sensor, depth: f64) -> PathUnits {
+    let radians = 1.0 / sensor.camera.fx;
+    PathUnits { metres: depth * radians, radians }
+}
+
+/// The numbers below `count` in an order that depends on seed and round only (Fisher and Yates 1938).
+fn shuffled(count: usize, seed: u64, round: usize) -> Vec<usize> {
+    let mut random = Pcg32::new(seed, round as u64);
+    let mut order: Vec<usize> = (0..count).collect();
+    for k in (1..count).rev() {
+        let other = (u64::from(random.next_u32()) * (k as u64 + 1)) >> 32;
+        order.swap(k, other as usize);
+    }
+    order
 }

@@ -2,7 +2,10 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
+use serde::{Deserialize, Serialize};
+
 use super::adam::Moments;
+use crate::checkpoint::exact_floats;
 use crate::gaussians::{Gaussian, Gaussians};
 
 /// Gaussians fainter than this are removed.
@@ -15,28 +18,28 @@ const OFFSET: f32 = 0.7;
 const SHRINK: f32 = 0.6;
 
 /// How strongly the views pull at every Gaussian, since the last change of density.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pull {
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Pull {
     /// Sum of lengths of gradients by the projected centre.
-    pub sum: Vec<f32>,
+    #[serde(with = "exact_floats")]
+    pub(super) sum: Vec<f32>,
     /// Number of exposures that drew it.
-    pub drawn: Vec<u32>,
+    pub(super) drawn: Vec<u32>,
 }
 
 impl Pull {
     /// No pull on `count` Gaussians.
     #[must_use]
-    pub fn zeros(count: usize) -> Self {
+    pub(super) fn zeros(count: usize) -> Self {
         Self { sum: vec![0.0; count], drawn: vec![0; count] }
     }
 
     /// Adds the pulls of an exposure.
-    pub fn add(&mut self, screen: &[f32], is_drawn: impl Fn(usize) -> bool) {
-        for (i, (sum, drawn)) in self.sum.iter_mut().zip(&mut self.drawn).enumerate() {
-            if is_drawn(i) {
-                *sum += screen[i];
-                *drawn += 1;
-            }
+    pub(super) fn add(&mut self, screen: &[f32], is_drawn: &[bool]) {
+        let own = self.sum.iter_mut().zip(&mut self.drawn);
+        for ((sum, drawn), (screen, _)) in own.zip(screen.iter().zip(is_drawn)).filter(|(_, (_, is))| **is) {
+            *sum += screen;
+            *drawn += 1;
         }
     }
 
@@ -45,18 +48,10 @@ impl Pull {
     }
 }
 
-/// Divides up to `room` Gaussians whose mean pull exceeds `threshold`, those with the largest first. Returns how many.
-pub fn divide(
-    gaussians: &mut Gaussians,
-    moments: &mut Moments,
-    pull: &Pull,
-    threshold: f32,
-    room: usize,
-) -> usize {
-    let mut torn: Vec<(f32, usize)> = (0..gaussians.len())
-        .map(|i| (pull.mean(i), i))
-        .filter(|(mean, _)| *mean > threshold)
-        .collect();
+/// Divides up to `room` Gaussians that are pulled, those with the largest first. Returns how many.
+pub(super) fn divide(gaussians: &mut Gaussians, moments: &mut Moments, pull: &Pull, room: usize) -> usize {
+    let mut torn: Vec<(f32, usize)> =
+        (0..gaussians.len()).map(|i| (pull.mean(i), i)).filter(|(mean, _)| *mean > 0.0).collect();
     torn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     torn.truncate(room);
     for &(_, i) in &torn {
@@ -84,7 +79,7 @@ fn children(parent: &Gaussian) -> [Gaussian; 2] {
 }
 
 /// Removes Gaussians that are faint, huge or not finite. Returns how many.
-pub fn prune(gaussians: &mut Gaussians, moments: &mut Moments) -> usize {
+pub(super) fn prune(gaussians: &mut Gaussians, moments: &mut Moments) -> usize {
     let before = gaussians.len();
     let faint = (FAINT / (1.0 - FAINT)).ln();
     let keep: Vec<usize> = (0..before)
@@ -101,7 +96,7 @@ pub fn prune(gaussians: &mut Gaussians, moments: &mut Moments) -> usize {
 }
 
 /// Makes Gaussian `keep[i]` the new Gaussian i; indices beyond the set are left out.
-pub fn select(gaussians: &mut Gaussians, moments: &mut Moments, keep: &[usize]) {
+pub(super) fn select(gaussians: &mut Gaussians, moments: &mut Moments, keep: &[usize]) {
     let pick = |set: &Gaussians| keep.iter().filter_map(|&i| set.get(i)).collect::<Gaussians>();
     *gaussians = pick(gaussians);
     moments.first = pick(&moments.first);
@@ -112,7 +107,7 @@ pub fn select(gaussians: &mut Gaussians, moments: &mut Moments, keep: &[usize]) 
 /// Order of the Gaussians along a Z-curve (Morton 1966) through their bounding box, 10 bits per axis: neighbours in
 /// space become neighbours in memory.
 #[must_use]
-pub fn morton_order(gaussians: &Gaussians) -> Vec<usize> {
+pub(super) fn morton_order(gaussians: &Gaussians) -> Vec<usize> {
     let planes = [0, 1, 2].map(|k| &gaussians.planes()[k]);
     let bounds = planes.map(|plane| {
         let finite = plane.iter().copied().filter(|x| x.is_finite());
@@ -147,7 +142,7 @@ fn forget(moments: &mut Moments, i: usize) {
 }
 
 /// Makes room for the moments of `count` Gaussians.
-pub fn resize(moments: &mut Moments, count: usize) {
+pub(super) fn resize(moments: &mut Moments, count: usize) {
     moments.first.resize(count);
     moments.second.resize(count);
     moments.updates.resize(count, 0);

@@ -20,8 +20,7 @@ impl DisplayCurve {
     #[must_use]
     pub fn new(inverse: &InverseResponse) -> Self {
         let light_of_knot = |k: usize| (k as f64 / SEGMENTS as f64).powi(2);
-        let display: Vec<f64> =
-            (0..=SEGMENTS).map(|k| display_of_light(inverse, light_of_knot(k))).collect();
+        let display: Vec<f64> = (0..=SEGMENTS).map(|k| display_of_light(inverse, light_of_knot(k))).collect();
         let segment = |k: usize| {
             let run = light_of_knot(k + 1) - light_of_knot(k);
             [display[k] as f32, ((display[k + 1] - display[k]) / run) as f32]

@@ -3,7 +3,8 @@
 use rayon::prelude::*;
 
 use super::display::DisplayCurve;
-use super::keyframe::Observation;
+use super::observation::Observation;
+use crate::losses::Ssim;
 use crate::raster::RasterImage;
 
 /// Weights of the terms.
@@ -54,21 +55,21 @@ impl LossTerms {
 
 /// Display values of a rendered image and the gradient by them.
 #[derive(Debug, Default)]
-pub struct DisplayPlanes {
+pub(super) struct DisplayPlanes {
     /// Rendered display values.
-    pub rendered: [Vec<f32>; 3],
+    pub(super) rendered: [Vec<f32>; 3],
     /// Captured display values; the rendered ones where they do not count.
-    pub captured: [Vec<f32>; 3],
+    pub(super) captured: [Vec<f32>; 3],
     /// Slope of display value by light.
     slope: [Vec<f32>; 3],
     /// Gradient of the loss by the rendered display values.
-    pub gradient: [Vec<f32>; 3],
+    pub(super) gradient: [Vec<f32>; 3],
 }
 
 impl DisplayPlanes {
     /// Takes a rendered image to display values, with `gain` on its light, and starts the gradient with the colour
     /// term. Returns that term and the mean squared difference.
-    pub fn compare(
+    pub(super) fn compare(
         &mut self,
         curve: &DisplayCurve,
         gain: f32,
@@ -131,8 +132,15 @@ impl DisplayPlanes {
         LossTerms { colour: f64::from(weight) * absolute, mean_square: square, ..LossTerms::default() }
     }
 
+    /// Adds the term of structural similarity, `weight` times one minus it, to the gradient and returns it.
+    pub(super) fn add_similarity(&mut self, ssim: &mut Ssim, size: [usize; 2], weight: f32) -> f64 {
+        let [captured, rendered] = [&self.captured, &self.rendered].map(|p| p.each_ref().map(Vec::as_slice));
+        let gradient = self.gradient.each_mut().map(Vec::as_mut_slice);
+        f64::from(weight) * (1.0 - ssim.add_gradient(size, captured, rendered, -weight, gradient))
+    }
+
     /// Takes the gradient from display values to linear light, and returns the gradient by the logarithm of the gain.
-    pub fn gradient_by_light(&self, gain: f32, image: &RasterImage, out: &mut RasterImage) -> f64 {
+    pub(super) fn gradient_by_light(&self, image: &RasterImage, out: &mut RasterImage) -> f64 {
         let mut by_gain = 0.0;
         for channel in 0..3 {
             let planes = (
@@ -152,17 +160,20 @@ impl DisplayPlanes {
             let of_rows: Vec<f32> = planes.into_par_iter().map(of_row).collect();
             by_gain += of_rows.into_iter().map(f64::from).sum::<f64>();
         }
-        let _ = gain;
         by_gain
     }
 }
 
 /// Rows of the planes of one channel.
-type RowOf<'a> =
-    (&'a mut [f32], &'a mut [f32], &'a mut [f32], &'a mut [f32], &'a [f32], &'a [u8]);
+type RowOf<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [f32], &'a mut [f32], &'a [f32], &'a [u8]);
 
 /// Depth and alpha terms; their gradients replace those by depth and alpha in `out`.
-pub fn compare_depth(image: &RasterImage, seen: &Observation, weights: &LossWeights, out: &mut RasterImage) -> f64 {
+pub(super) fn compare_depth(
+    image: &RasterImage,
+    seen: &Observation,
+    weights: &LossWeights,
+    out: &mut RasterImage,
+) -> f64 {
     let share = 1.0 / (image.width * image.height) as f32;
     let rows = (
         out.depth.par_chunks_mut(image.width),

@@ -1,16 +1,26 @@
-//! Blur-aware bundle adjustment: a sharp map and the trajectory of every exposure, from blurred frames.
+//! Blur-aware bundle adjustment: a sharp map and the path of every exposure, from blurred frames.
+//!
+//! Every step renders the virtual views of one keyframe's exposure, averages them in linear light, takes the mean
+//! through the camera's response and compares it with what was captured: colours, structural similarity (MBA-SLAM
+//! eq. 62) and depth. The gradient moves the Gaussians and the keyframe's path together (MBA-SLAM section 3.3).
 
-pub mod adam;
+mod adam;
 mod adjustment;
-pub mod density;
+mod density;
 mod display;
-mod keyframe;
+mod engine;
+mod frame_state;
 mod loss;
-mod pose_step;
+mod observation;
+mod path_step;
+mod schedule;
 mod seeding;
 
-pub use adjustment::{BundleAdjustment, Keyframe, StepPlan};
+pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport, typical_depth};
 pub use display::DisplayCurve;
-pub use keyframe::{Observation, ObservationPyramid, Sensor};
+pub use engine::{Engine, Exposure, ExposureLoss};
+pub use frame_state::FrameState;
 pub use loss::{LossTerms, LossWeights};
-pub use pose_step::{PoseMoments, PoseUnits};
+pub use observation::{Observation, ObservationPyramid, Sensor};
+pub use path_step::PathPrior;
+pub use schedule::{Schedule, Stage, StepPlan};

@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
-use super::keyframe::Observation;
+use super::observation::Observation;
 use crate::gaussians::{Gaussian, Gaussians};
 
 /// Side of the largest square that becomes one Gaussian, pixels.
@@ -26,7 +26,7 @@ const COVERED: f32 = 0.5;
 /// colour and depth, unless the middle of the square is covered according to `alpha` (row by row, as large as `seen`).
 ///
 /// Adds at most `room` and returns how many.
-pub fn seed(
+pub(super) fn seed(
     gaussians: &mut Gaussians,
     seen: &Observation,
     inverse_response: &InverseResponse,
@@ -97,7 +97,10 @@ impl Squares<'_> {
         let mut depths = Vec::with_capacity((right - left) * (bottom - top));
         for pixel in pixels {
             let bytes = self.seen.colour.each_ref().map(|plane| plane[pixel]);
-            light.iter_mut().zip(bytes).for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte));
+            light
+                .iter_mut()
+                .zip(bytes)
+                .for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte));
             let grey = bytes.iter().map(|&byte| f32::from(byte)).sum::<f32>() / (3.0 * 255.0);
             (sum, squares, count) = (sum + grey, squares + grey * grey, count + 1.0);
             if self.seen.depth[pixel] > 0.0 {

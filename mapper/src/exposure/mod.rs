@@ -4,8 +4,10 @@
 //! and alpha are not blurred: they are those at mid exposure. The gradient of a loss goes back through every view to
 //! the Gaussians and to the poses at shutter opening and closing.
 
+mod path;
 mod renderer;
 mod scratch;
 
-pub use renderer::{ExposureGradient, ExposureRenderer};
+pub use path::{ExposurePath, PATH_PARAMETERS};
+pub use renderer::ExposureRenderer;
 pub use scratch::ExposureScratch;

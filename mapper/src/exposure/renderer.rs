@@ -2,10 +2,11 @@
 
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::simd::Level;
-use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
-use nalgebra::{SMatrix, Vector6};
+use mba_tracker::trajectory::SampleRule;
+use nalgebra::SVector;
 use rayon::prelude::*;
 
+use super::path::{ExposurePath, PATH_PARAMETERS};
 use super::scratch::{ExposureScratch, VirtualView};
 use crate::gaussians::Gaussians;
 use crate::raster::{GaussianGradients, RasterImage, RasterView, Rasterizer};
@@ -14,18 +15,6 @@ use crate::raster::{GaussianGradients, RasterImage, RasterView, Rasterizer};
 #[derive(Clone, Copy, Debug)]
 pub struct ExposureRenderer {
     rasterizer: Rasterizer,
-}
-
-/// Gradient of a loss by the poses at shutter opening and closing.
-///
-/// Both by the tangent of [`mba_tracker::geometry::RigidTransform::perturbed`]: translation in the world, metres,
-/// then rotation in the camera frame, radians.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ExposureGradient {
-    /// By the pose at opening.
-    pub start: Vector6<f64>,
-    /// By the pose at closing.
-    pub end: Vector6<f64>,
 }
 
 impl ExposureRenderer {
@@ -37,7 +26,7 @@ impl ExposureRenderer {
 
     /// Renders an exposure into `image`, which gets the size of the camera.
     ///
-    /// `path` holds poses `world_from_camera`. Colour is the mean of `views` virtual views at the times of
+    /// Colour is the mean of `views` virtual views at the times of
     /// [`SampleRule::Midpoint`], over `background`, linear RGB; depth and alpha are those of the view at mid
     /// exposure. So that there is such a view, an even number of views counts as the next odd one, and none as one.
     #[expect(clippy::too_many_arguments, reason = "inputs of one image, and where the results go")]
@@ -45,7 +34,7 @@ impl ExposureRenderer {
         &self,
         gaussians: &Gaussians,
         camera: &PinholeCamera,
-        path: &ExposureTrajectory,
+        path: &ExposurePath,
         views: usize,
         background: [f64; 3],
         scratch: &mut ExposureScratch,
@@ -56,7 +45,7 @@ impl ExposureRenderer {
         scratch.used_mut().par_iter_mut().enumerate().for_each(|(k, view)| {
             let time = SampleRule::Midpoint.time(k, views);
             view.world_from_camera = path.at(time);
-            view.by_ends = path.pose_jacobian(time);
+            view.by_path = path.pose_jacobian(time);
             let raster_view =
                 RasterView { camera: *camera, world_from_camera: view.world_from_camera, background };
             self.rasterizer.forward(gaussians, &raster_view, &mut view.raster, &mut view.image);
@@ -70,7 +59,7 @@ impl ExposureRenderer {
     }
 
     /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
-    /// by the poses at both ends. `by_image` is the gradient by the image of the last call of [`Self::forward`],
+    /// by the parameters of the path, in the order of [`ExposurePath::pose_jacobian`]. `by_image` is the gradient by the image of the last call of [`Self::forward`],
     /// which had the same Gaussians and the same scratch memory.
     ///
     /// [`GaussianGradients::screen`] gets the sum over the virtual views of the lengths of their gradients: the
@@ -83,8 +72,8 @@ impl ExposureRenderer {
         by_image: &RasterImage,
         scratch: &mut ExposureScratch,
         gradients: &mut GaussianGradients,
-    ) -> ExposureGradient {
-        let mut by_ends = SMatrix::<f64, 12, 1>::zeros();
+    ) -> SVector<f64, PATH_PARAMETERS> {
+        let mut by_path = SVector::<f64, PATH_PARAMETERS>::zeros();
         let views = scratch.used;
         let mut by_view = by_image.clone();
         by_view.colour.iter_mut().flatten().for_each(|value| *value /= views as f32);
@@ -95,12 +84,9 @@ impl ExposureRenderer {
             [by_view.depth, by_view.alpha] =
                 if is_mid { core::mem::take(&mut geometry) } else { [zeros(), zeros()] };
             let by_pose = self.rasterizer.backward(gaussians, &by_view, &mut view.raster, gradients);
-            by_ends += view.by_ends.transpose() * by_pose.tangent(&view.world_from_camera);
+            by_path += view.by_path.transpose() * by_pose.tangent(&view.world_from_camera);
         }
-        ExposureGradient {
-            start: by_ends.fixed_rows::<6>(0).into_owned(),
-            end: by_ends.fixed_rows::<6>(6).into_owned(),
-        }
+        by_path
     }
 }
 

@@ -3,6 +3,7 @@
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::SMatrix;
 
+use super::path::PATH_PARAMETERS;
 use crate::raster::{RasterImage, RasterScratch};
 
 /// Everything that rendering an exposure leaves for its backward pass; reused from exposure to exposure, so that
@@ -22,8 +23,8 @@ pub(super) struct VirtualView {
     pub(super) raster: RasterScratch,
     pub(super) image: RasterImage,
     pub(super) world_from_camera: RigidTransform,
-    /// Derivative of its pose by those at opening and closing.
-    pub(super) by_ends: SMatrix<f64, 6, 12>,
+    /// Derivative of its pose by the parameters of the path.
+    pub(super) by_path: SMatrix<f64, 6, PATH_PARAMETERS>,
 }
 
 impl Default for VirtualView {
@@ -32,7 +33,7 @@ impl Default for VirtualView {
             raster: RasterScratch::default(),
             image: RasterImage::default(),
             world_from_camera: RigidTransform::identity(),
-            by_ends: SMatrix::zeros(),
+            by_path: SMatrix::zeros(),
         }
     }
 }

@@ -109,7 +109,12 @@ fn half(sensor: &Sensor, forward: &ForwardResponse, finer: &Observation, level: 
         blocks(finer).map(|block| forward.encode(mean(block))).collect()
     });
     let depth = blocks(finer).map(|block| nearest_surface(block.map(|pixel| finer.depth[pixel]))).collect();
-    Observation { camera: sensor.camera.at_level(level), colour, depth, region: sensor.region.at_level(level) }
+    Observation {
+        camera: sensor.camera.at_level(level),
+        colour,
+        depth,
+        region: sensor.region.at_level(level),
+    }
 }
 
 /// Mean depth of the nearest surface among four depths, 0 where none is known: across an edge there is no mean.

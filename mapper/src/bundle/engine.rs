@@ -1,0 +1,104 @@
+//! The loss of one exposure and all its gradients.
+
+use mba_tracker::simd::Level;
+use nalgebra::SVector;
+
+use super::display::DisplayCurve;
+use super::loss::{DisplayPlanes, LossTerms, compare_depth};
+use super::observation::{Observation, Sensor};
+use super::schedule::StepPlan;
+use crate::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, PATH_PARAMETERS};
+use crate::gaussians::Gaussians;
+use crate::losses::Ssim;
+use crate::raster::{GaussianGradients, RasterImage};
+
+/// Renders exposures, compares them with what was captured, and takes gradients back. Memory is kept from exposure to
+/// exposure.
+#[derive(Debug)]
+pub struct Engine {
+    curve: DisplayCurve,
+    renderer: ExposureRenderer,
+    scratch: ExposureScratch,
+    image: RasterImage,
+    by_image: RasterImage,
+    planes: DisplayPlanes,
+    ssim: Ssim,
+    gradients: GaussianGradients,
+}
+
+/// What a frame is compared with.
+#[derive(Clone, Copy, Debug)]
+pub struct Exposure<'a> {
+    /// What was captured, at the resolution of the plan.
+    pub seen: &'a Observation,
+    /// Path of the camera.
+    pub path: &'a ExposurePath,
+    /// Gain on the map's light.
+    pub gain: f64,
+    /// Number of virtual views.
+    pub views: usize,
+}
+
+/// Loss of an exposure, and gradients by what belongs to it alone.
+#[derive(Clone, Copy, Debug)]
+pub struct ExposureLoss {
+    /// The terms.
+    pub terms: LossTerms,
+    /// Gradient by the parameters of the path.
+    pub by_path: SVector<f64, PATH_PARAMETERS>,
+    /// Gradient by the logarithm of the gain.
+    pub by_log_gain: f64,
+}
+
+impl Engine {
+    /// An engine with the instruction set `level`; levels differ by rounding only.
+    #[must_use]
+    pub fn new(level: Level, sensor: &Sensor) -> Self {
+        Self {
+            curve: DisplayCurve::new(&sensor.inverse_response),
+            renderer: ExposureRenderer::new(level),
+            scratch: ExposureScratch::default(),
+            image: RasterImage::default(),
+            by_image: RasterImage::default(),
+            planes: DisplayPlanes::default(),
+            ssim: Ssim::new(level),
+            gradients: GaussianGradients::default(),
+        }
+    }
+
+    /// The loss of `exposure` with that map; gradients by the map are then in [`Self::gradients`].
+    pub fn evaluate(
+        &mut self,
+        gaussians: &Gaussians,
+        exposure: Exposure<'_>,
+        plan: &StepPlan,
+    ) -> ExposureLoss {
+        let Exposure { seen, path, gain, views } = exposure;
+        let (camera, gain) = (&seen.camera, gain as f32);
+        let (scratch, image) = (&mut self.scratch, &mut self.image);
+        self.renderer.forward(gaussians, camera, path, views, [0.0; 3], scratch, image);
+        let mut terms = self.planes.compare(&self.curve, gain, image, seen, plan.weights.colour);
+        if plan.weights.similarity > 0.0 {
+            let size = [camera.width, camera.height];
+            terms.similarity = self.planes.add_similarity(&mut self.ssim, size, plan.weights.similarity);
+        }
+        self.by_image.resize(camera.width, camera.height);
+        let by_log_gain = self.planes.gradient_by_light(image, &mut self.by_image);
+        terms.depth = compare_depth(image, seen, &plan.weights, &mut self.by_image);
+        self.gradients.reset(gaussians.len());
+        let by_path = self.renderer.backward(gaussians, &self.by_image, scratch, &mut self.gradients);
+        ExposureLoss { terms, by_path, by_log_gain }
+    }
+
+    /// Gradients by the map of the last exposure.
+    #[must_use]
+    pub fn gradients(&self) -> &GaussianGradients {
+        &self.gradients
+    }
+
+    /// Which Gaussians the last exposure drew, in any of its views.
+    #[must_use]
+    pub fn drawn(&self) -> &[bool] {
+        self.scratch.drawn_mask()
+    }
+}

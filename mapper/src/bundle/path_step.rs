@@ -1,0 +1,186 @@
+//! Steps of the path of an exposure.
+
+use nalgebra::{SMatrix, SVector, Vector6};
+use serde::{Deserialize, Serialize};
+
+use crate::continuity::MotionPrediction;
+use crate::exposure::{ExposurePath, PATH_PARAMETERS};
+
+/// Decay of the mean of the gradient.
+const BETA_1: f64 = 0.9;
+/// Decay of the mean of its square.
+const BETA_2: f64 = 0.99;
+/// Cost of one standard deviation from the predicted motion, in units of the loss: far below what a blurred picture
+/// says about its motion, above the noise of a sharp one, which says nothing.
+const PRIOR_COST: f64 = 2e-5;
+/// Standard deviation of the bow, pixels: hands turn round within few exposures only.
+const BOW_PX: f64 = 2.0;
+
+/// Moments of the gradients of one path.
+///
+/// The parameters are the middle, the motion from opening to closing and the bow, each six numbers in units that move
+/// the picture by about a pixel. In these coordinates the problem nearly falls apart into three: the middle says where
+/// the picture is, the motion how it is smeared, the bow in which shape. All directions share one scale of step, that
+/// of the middle, so that what the picture does not show hardly moves: Adam's own scales would let it wander.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PathMoments {
+    first: [[f64; 6]; 3],
+    /// Mean squared gradient by one number of the middle.
+    second: f64,
+    updates: u32,
+}
+
+impl Default for PathMoments {
+    fn default() -> Self {
+        Self { first: [[0.0; 6]; 3], second: 0.0, updates: 0 }
+    }
+}
+
+/// How far one pixel is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathUnits {
+    /// Metres per pixel at the typical depth.
+    pub metres: f64,
+    /// Radians per pixel.
+    pub radians: f64,
+}
+
+impl PathUnits {
+    fn tangent(self) -> Vector6<f64> {
+        let Self { metres, radians } = self;
+        Vector6::new(metres, metres, metres, radians, radians, radians)
+    }
+}
+
+/// What is known of a path besides its picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PathPrior {
+    /// Motion that the neighbours in time suggest.
+    pub motion: Option<MotionPrediction>,
+}
+
+/// How far one step goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathStep {
+    /// Typical movement of the picture, full-resolution pixels.
+    pub pixels: f64,
+    /// The middle stays where it is.
+    pub hold_middle: bool,
+    /// Motion and bow stay as they are.
+    pub still: bool,
+}
+
+impl PathMoments {
+    /// Moves `path` one step against `gradient`, the gradient of the loss by the parameters of the path.
+    pub fn step(
+        &mut self,
+        path: &mut ExposurePath,
+        gradient: &SVector<f64, PATH_PARAMETERS>,
+        prior: &PathPrior,
+        units: PathUnits,
+        step: PathStep,
+    ) {
+        let unit = units.tangent();
+        let [middle, motion, bow] = by_coordinates(gradient).map(|g| g.component_mul(&unit));
+        let motion = motion + prior.gradient_by_motion(path, unit);
+        let bow = bow + path.bow.component_div(&unit) * (PRIOR_COST / (BOW_PX * BOW_PX));
+        self.updates += 1;
+        let updates = self.updates.min(10_000) as i32;
+        let corrections = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powi(updates)));
+        self.second = BETA_2 * self.second + (1.0 - BETA_2) * middle.norm_squared() / 6.0;
+        let scale = -step.pixels * corrections[0] / ((self.second * corrections[1]).sqrt() + 1e-20);
+        let mut moves = [Vector6::zeros(); 3];
+        for (block, (mean, gradient)) in self.first.iter_mut().zip([middle, motion, bow]).enumerate() {
+            let mean_now = Vector6::from(*mean) * BETA_1 + gradient * (1.0 - BETA_1);
+            *mean = mean_now.into();
+            moves[block] = (mean_now * scale).component_mul(&unit);
+        }
+        if step.hold_middle {
+            moves[0].fill(0.0);
+        }
+        if step.still {
+            moves[1..].iter_mut().for_each(|block| block.fill(0.0));
+        }
+        *path = path.perturbed(&from_coordinates(&moves));
+    }
+}
+
+impl PathPrior {
+    /// Gradient of the prior by the motion, in pixels.
+    fn gradient_by_motion(&self, path: &ExposurePath, unit: Vector6<f64>) -> Vector6<f64> {
+        let Some(prediction) = self.motion else { return Vector6::zeros() };
+        let [t, r] = [prediction.translation_sigma, prediction.rotation_sigma].map(|sigma| sigma * sigma);
+        let variance = Vector6::new(t, t, t, r, r, r);
+        let excess = path.ends.motion() - prediction.motion;
+        excess.component_div(&variance).component_mul(&unit) * PRIOR_COST
+    }
+}
+
+/// Gradients by middle, motion and bow.
+fn by_coordinates(gradient: &SVector<f64, PATH_PARAMETERS>) -> [Vector6<f64>; 3] {
+    let part = |first: usize| Vector6::from_iterator(gradient.iter().copied().skip(first).take(6));
+    let [start, end, bow] = [part(0), part(6), part(12)];
+    [start + end, (end - start) * 0.5, bow]
+}
+
+/// Tangents at both ends and the bow for moves of middle, motion and bow.
+fn from_coordinates([middle, motion, bow]: &[Vector6<f64>; 3]) -> SMatrix<f64, PATH_PARAMETERS, 1> {
+    let mut step = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
+    step.fixed_rows_mut::<6>(0).copy_from(&(middle - motion * 0.5));
+    step.fixed_rows_mut::<6>(6).copy_from(&(middle + motion * 0.5));
+    step.fixed_rows_mut::<6>(12).copy_from(bow);
+    step
+}
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::RigidTransform;
+    use mba_tracker::trajectory::ExposureTrajectory;
+
+    use super::*;
+
+    const UNITS: PathUnits = PathUnits { metres: 0.008, radians: 0.002 };
+
+    /// Minimises half the squared distance of the path's parameters from a target, in pixels.
+    fn descend(target: &[Vector6<f64>; 3], prior: PathPrior, hold_middle: bool) -> [Vector6<f64>; 3] {
+        let mut path = ExposurePath::linear(ExposureTrajectory::still(RigidTransform::identity()));
+        let mut moments = PathMoments::default();
+        let unit = UNITS.tangent();
+        let state = |path: &ExposurePath| {
+            let origin = RigidTransform::identity();
+            let middle = origin.tangent_to(&path.ends.mid());
+            [middle, path.ends.motion(), path.bow].map(|x| x.component_div(&unit))
+        };
+        for k in 0..400 {
+            let now = state(&path);
+            let [a, b, c] = [0, 1, 2].map(|i| (now[i] - target[i]).component_div(&unit));
+            let mut gradient = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
+            gradient.fixed_rows_mut::<6>(0).copy_from(&(a * 0.5 - b));
+            gradient.fixed_rows_mut::<6>(6).copy_from(&(a * 0.5 + b));
+            gradient.fixed_rows_mut::<6>(12).copy_from(&c);
+            let pixels = 0.1 * 0.98_f64.powi(k);
+            moments.step(&mut path, &gradient, &prior, UNITS, PathStep { pixels, hold_middle, still: false });
+        }
+        state(&path)
+    }
+
+    #[test]
+    fn middle_motion_and_bow_are_found() {
+        let target = [
+            Vector6::new(0.5, -0.4, 0.3, 0.6, -0.2, 0.1),
+            Vector6::new(1.0, 0.5, -0.5, 0.3, 0.8, -0.6),
+            Vector6::new(0.2, -0.3, 0.1, 0.4, 0.1, -0.2),
+        ];
+        let found = descend(&target, PathPrior::default(), false);
+        for (found, target) in found.iter().zip(&target) {
+            assert!((found - target).norm() < 0.1, "{found} instead of {target}");
+        }
+    }
+
+    #[test]
+    fn a_held_middle_stays() {
+        let target = [Vector6::repeat(0.5), Vector6::repeat(0.5), Vector6::zeros()];
+        let [middle, motion, _] = descend(&target, PathPrior::default(), true);
+        assert!(middle.norm() < 1e-3 && (motion - target[1]).norm() < 0.1, "{middle} {motion}");
+    }
+}

@@ -1,0 +1,126 @@
+//! What is done when: from coarse to fine, from long steps to short ones.
+
+use serde::{Deserialize, Serialize};
+
+use super::adam::StepLengths;
+use super::loss::LossWeights;
+
+/// How one step is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepPlan {
+    /// Resolution, 0 is full.
+    pub level: usize,
+    /// Distance of virtual views along the blur, pixels of the level.
+    pub spacing: f64,
+    /// Most virtual views.
+    pub max_views: usize,
+    /// Step lengths of the Gaussians.
+    pub lengths: StepLengths,
+    /// Step length of the paths, full-resolution pixels.
+    pub path_pixels: f64,
+    /// Step length of the logarithms of the gains.
+    pub log_gain: f64,
+    /// Weights of the losses.
+    pub weights: LossWeights,
+}
+
+/// A part of the schedule.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stage {
+    /// Steps without a time budget.
+    pub steps: usize,
+    /// Share of the time under a time budget.
+    pub time_share: f64,
+    /// Resolution, 0 is full.
+    pub level: usize,
+    /// Distance of virtual views along the blur, pixels of the level.
+    pub spacing: f64,
+    /// Most virtual views.
+    pub max_views: usize,
+}
+
+/// The stages in order.
+///
+/// Where a run stands is its *position* from 0 to 1. Without a time budget every step advances it by the same amount
+/// within a stage; with one, time does.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Schedule {
+    stages: Vec<Stage>,
+}
+
+/// Until this position steps keep their length, then they shrink to [`FINAL_LENGTH`].
+const HOLD: f64 = 0.25;
+/// Length of the last step, relative to the first.
+const FINAL_LENGTH: f64 = 0.03;
+/// Paths and gains rest until the map has taken shape.
+const PATHS_FROM: f64 = 0.03;
+/// The density changes this often while it changes.
+const DENSITY_CHANGES: f64 = 16.0;
+/// Position from which the density is final.
+const DENSITY_UNTIL: f64 = 0.6;
+
+const LENGTHS: StepLengths =
+    StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
+const PATH_PIXELS: f64 = 0.04;
+const LOG_GAIN: f64 = 2e-3;
+const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 0.1, alpha: 0.01 };
+
+impl Schedule {
+    /// The schedule for a number of keyframes: every one is visited about as often, whatever their number.
+    #[must_use]
+    pub fn new(keyframes: usize) -> Self {
+        let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
+        let coarse = Stage { steps: visits(10, 300), time_share: 0.15, level: 1, spacing: 3.0, max_views: 9 };
+        let fine = Stage { steps: visits(12, 500), time_share: 0.65, level: 0, spacing: 3.0, max_views: 11 };
+        let last = Stage { steps: visits(3, 100), time_share: 0.2, level: 0, spacing: 2.0, max_views: 21 };
+        Self { stages: vec![coarse, fine, last] }
+    }
+
+    /// Steps of all stages without a time budget.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        self.stages.iter().map(|stage| stage.steps).sum()
+    }
+
+    /// The stage at a position, by its number from 0.
+    #[must_use]
+    pub fn stage(&self, position: f64, timed: bool) -> usize {
+        let mut end = 0.0;
+        for (k, stage) in self.stages.iter().enumerate() {
+            end += self.share(stage, timed);
+            if position < end {
+                return k;
+            }
+        }
+        self.stages.len().saturating_sub(1)
+    }
+
+    /// Share of a stage in the positions.
+    fn share(&self, stage: &Stage, timed: bool) -> f64 {
+        if timed { stage.time_share } else { stage.steps as f64 / self.steps().max(1) as f64 }
+    }
+
+    /// The plan of the step at a position.
+    #[must_use]
+    pub fn plan(&self, position: f64, timed: bool) -> StepPlan {
+        let stage = self.stages[self.stage(position, timed)];
+        let shrink = FINAL_LENGTH.powf((position - HOLD).max(0.0) / (1.0 - HOLD));
+        let paths = if position < PATHS_FROM { 0.0 } else { shrink };
+        StepPlan {
+            level: stage.level,
+            spacing: stage.spacing,
+            max_views: stage.max_views,
+            lengths: LENGTHS.scaled(shrink as f32),
+            path_pixels: PATH_PIXELS * paths,
+            log_gain: LOG_GAIN * paths,
+            weights: WEIGHTS,
+        }
+    }
+
+    /// Whether the density changes between two positions.
+    #[must_use]
+    pub fn density_changes(&self, before: f64, after: f64) -> bool {
+        let count = |position: f64| (position.min(DENSITY_UNTIL) * DENSITY_CHANGES / DENSITY_UNTIL).floor();
+        count(after) > count(before)
+    }
+}

@@ -2,4 +2,5 @@
 
 pub mod raster;
 pub mod recording;
+pub mod ssim;
 pub mod transfer;

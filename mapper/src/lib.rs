@@ -1,11 +1,14 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
 pub mod checkpoint;
+pub mod continuity;
 pub mod dataset;
 pub mod deblurring;
 mod error;
 pub mod evaluation;
+pub mod exposure;
 pub mod gaussians;
+pub mod losses;
 mod png;
 pub mod raster;
 pub mod rendering;

@@ -1,6 +1,7 @@
 //! The Gaussian rasterizer against golden data, its oracle, finite differences and hostile input.
 
 mod derivatives;
+mod exposure;
 mod golden;
 mod levels;
 mod ply;

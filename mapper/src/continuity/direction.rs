@@ -1,0 +1,79 @@
+//! The direction of time of every exposure, by dynamic programming over the frames.
+//!
+//! The motion between two frames is told by their mid-exposure poses, which a swap does not change. A pair of exposures
+//! costs the energy of the gentlest motion that has their velocities and joins their middles; the cheapest chain of
+//! directions wins.
+
+use nalgebra::Vector3;
+
+use super::fit::Measured;
+use super::scales::{Sample, typical_derivatives};
+use super::spline::Part;
+
+/// Cost at which a pair says nothing more: one of the two was aligned to the wrong place.
+const HIGHEST_PAIR_COST: f64 = 60.0;
+
+/// Exposures below this many seconds have no velocity.
+const INSTANT: f64 = 1e-6;
+
+/// Which of `measured` run against time as measured. A swap has to lower the cost by `evidence`.
+pub(super) fn reversed_exposures(measured: &[Measured], evidence: f64) -> Vec<bool> {
+    let samples: Vec<Sample> = measured.iter().map(Measured::sample).collect();
+    let accelerations = Part::BOTH.map(|part| typical_derivatives(&samples, part, 2));
+    // Per direction of a frame: the lowest cost of all frames up to it, and the direction of the one before.
+    let mut costs = vec![[0.0, evidence]];
+    let mut before = vec![[false; 2]];
+    for (k, pair) in measured.windows(2).enumerate() {
+        let usual = [0, 1].map(|part| accelerations[part][k].max(accelerations[part][k + 1]));
+        let [forward, backward] = costs[k];
+        let step = [false, true].map(|direction| {
+            let from_forward = forward + pair_cost(pair, [false, direction], usual);
+            let from_backward = backward + pair_cost(pair, [true, direction], usual);
+            let prior = if direction { evidence } else { 0.0 };
+            (from_forward.min(from_backward) + prior, from_backward < from_forward)
+        });
+        costs.push(step.map(|(cost, _)| cost));
+        before.push(step.map(|(_, direction)| direction));
+    }
+    trace_back(&costs, &before)
+}
+
+fn trace_back(costs: &[[f64; 2]], before: &[[bool; 2]]) -> Vec<bool> {
+    let mut direction = costs.last().is_some_and(|&[forward, backward]| backward < forward);
+    let mut reversed = vec![false; costs.len()];
+    for (k, choice) in before.iter().enumerate().rev() {
+        reversed[k] = direction;
+        direction = choice[usize::from(direction)];
+    }
+    reversed
+}
+
+/// Energy of the gentlest motion between two exposures, in units of what is usual.
+fn pair_cost(pair: &[Measured], reversed: [bool; 2], usual_accelerations: [f64; 2]) -> f64 {
+    let [a, b] = [&pair[0], &pair[1]];
+    let seconds = b.timestamp - a.timestamp;
+    let cost = |part: Part, acceleration: f64| {
+        let middle = part.step(&a.exposure.mid(), &b.exposure.mid()) / seconds;
+        let excess = |frame: &Measured, reversed| {
+            velocity(frame, part, reversed).map_or_else(Vector3::zeros, |velocity| velocity - middle)
+        };
+        let (at_a, at_b) = (excess(a, reversed[0]), excess(b, reversed[1]));
+        // Integral of the squared acceleration of the cubic between them, divided by 4 over the time.
+        let energy = at_a.norm_squared() + at_a.dot(&at_b) + at_b.norm_squared();
+        let noise = velocity_variance(a, part) + velocity_variance(b, part);
+        energy / ((0.5 * acceleration * seconds).powi(2) + noise)
+    };
+    let [translation, rotation] = usual_accelerations;
+    let cost = cost(Part::Translation, translation) + cost(Part::Rotation, rotation);
+    (0.5 * cost).min(HIGHEST_PAIR_COST)
+}
+
+fn velocity(frame: &Measured, part: Part, reversed: bool) -> Option<Vector3<f64>> {
+    let path = part.step(&frame.exposure.start, &frame.exposure.end);
+    let sign = if reversed { -1.0 } else { 1.0 };
+    (frame.seconds() > INSTANT).then(|| path * (sign / frame.seconds()))
+}
+
+fn velocity_variance(frame: &Measured, part: Part) -> f64 {
+    (frame.noise_of(part) / frame.seconds().max(INSTANT)).powi(2)
+}

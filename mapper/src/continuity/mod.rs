@@ -1,0 +1,30 @@
+//! Continuity over the whole sequence: what one blurred frame cannot tell, its neighbours can.
+//!
+//! A blurred image looks the same when start and end of its exposure are swapped, and now and then a frame is aligned
+//! to the wrong place or not at all. Between frames a camera cannot jump, so a smooth path through the exposures tells
+//! which of them are wrong and what belongs in their place. The path is a uniform cubic B-spline of about two control
+//! points per frame; its increments solve a second-order cone program (clarabel) with a Huber norm per frame, a bending
+//! term whose strength follows from the sequence itself, and physical limits of acceleration and jerk.
+//!
+//! [`repair`] corrects swaps, outliers and lost frames and leaves every other frame as it was measured, bit for bit.
+//! [`repair_run`] is the same for the data of a RUN folder. [`predict_motions`] gives bundle adjustment the motion during
+//! an exposure that the neighbours of a frame suggest.
+
+mod direction;
+mod error;
+mod fit;
+mod frame;
+mod prediction;
+mod problem;
+mod repair;
+mod run_data;
+mod scales;
+mod settings;
+mod spline;
+
+pub use error::ContinuityError;
+pub use frame::{ContinuityFrame, PoseNoise};
+pub use prediction::{MotionPrediction, predict_motions};
+pub use repair::{Continuity, ContinuityEnergy, FrameVerdict, repair};
+pub use run_data::{RepairedRun, repair_run, run_frames};
+pub use settings::{ContinuitySettings, MotionLimits};

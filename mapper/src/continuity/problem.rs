@@ -1,0 +1,282 @@
+//! The second-order cone program of one half of the poses, translation or rotation.
+//!
+//! Unknown are the increments φ of the control points, the same program for both halves since rotations are linearised
+//! at the current path. With residuals z of the two ends of frame i, weights β, standard deviations σ and differences D
+//! of the current control points:
+//!
+//! ```text
+//! minimise    Σ_i ½ s_i² + h t_i  +  ½ Σ_k ‖(D³_k + Δ³φ_k) / j_k‖²
+//! subject to  ‖((z_start - Σ β φ) / σ_i, (z_end - Σ β φ) / σ_i)‖ ≤ s_i + t_i,   t_i ≥ 0      (Huber of width h)
+//!             ‖D²_k + Δ²φ_k‖ ≤ a_max step²,   ‖D³_k + Δ³φ_k‖ ≤ j_max step³
+//! ```
+//!
+//! The control points bound the acceleration of the whole spline (convex hull), and its jerk is constant per piece.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultSettings, DefaultSettingsBuilder, DefaultSolver, IPSolver, SolverStatus, SupportedConeT,
+};
+use nalgebra::Vector3;
+
+use super::spline::Support;
+
+/// How often limits that a solution breaks are added before all of them are.
+const LIMIT_ROUNDS: usize = 3;
+
+/// By how much a limit may be exceeded, as a share of it, without mattering.
+const LIMIT_SLACK: f64 = 1e-3;
+
+const SECOND_DIFFERENCE: [f64; 3] = [1.0, -2.0, 1.0];
+const THIRD_DIFFERENCE: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
+
+/// One frame's residuals.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Observation {
+    pub(super) supports: [Support; 2],
+    /// From the current path to the measured ends, world vectors.
+    pub(super) residuals: [Vector3<f64>; 2],
+    pub(super) sigma: f64,
+}
+
+/// The data of the program; lengths in metres or radians.
+#[derive(Clone, Debug)]
+pub(super) struct Problem {
+    pub(super) observations: Vec<Observation>,
+    /// From each control point to the next, at the current path.
+    pub(super) steps: Vec<Vector3<f64>>,
+    /// Standard deviation of each third difference.
+    pub(super) bending: Vec<f64>,
+    pub(super) max_second: f64,
+    pub(super) max_third: f64,
+    pub(super) huber: f64,
+}
+
+impl Problem {
+    /// The increments of the control points, or what the solver says instead.
+    pub(super) fn solve(&self) -> Result<Vec<Vector3<f64>>, String> {
+        // Limits are far away as a rule, and a program without them is much smaller.
+        let mut limits = Limits { second: Vec::new(), third: Vec::new() };
+        for _ in 0..LIMIT_ROUNDS {
+            let increments = self.solve_within(&limits)?;
+            let broken = self.broken(&increments);
+            if broken.second.is_empty() && broken.third.is_empty() {
+                return Ok(increments);
+            }
+            limits.add(broken);
+        }
+        self.solve_within(&self.all_limits())
+    }
+
+    fn solve_within(&self, limits: &Limits) -> Result<Vec<Vector3<f64>>, String> {
+        let unit = self.unit();
+        let program = self.program(limits, unit);
+        let increments = program.solve(3 * self.controls())?;
+        Ok(increments.chunks_exact(3).map(|x| Vector3::new(x[0], x[1], x[2]) * unit).collect())
+    }
+
+    fn controls(&self) -> usize {
+        self.steps.len() + 1
+    }
+
+    /// Unit of the unknowns that makes the program's numbers moderate.
+    fn unit(&self) -> f64 {
+        self.observations.iter().map(|o| o.sigma).fold(f64::INFINITY, f64::min)
+    }
+
+    fn seconds(&self) -> Vec<Vector3<f64>> {
+        self.steps.windows(2).map(|pair| pair[1] - pair[0]).collect()
+    }
+
+    fn thirds(&self) -> Vec<Vector3<f64>> {
+        self.steps.windows(3).map(|w| w[2] - w[1] * 2.0 + w[0]).collect()
+    }
+
+    fn program(&self, limits: &Limits, unit: f64) -> Program {
+        let controls = self.controls();
+        let mut program = Program::new(3 * controls + 2 * self.observations.len());
+        for (k, (third, sigma)) in self.thirds().iter().zip(&self.bending).enumerate() {
+            program.add_square(k, &THIRD_DIFFERENCE.map(|c| c * unit / sigma), &(third / *sigma));
+        }
+        let nonnegative = 3 * controls + 1;
+        program.add_nonnegative((0..self.observations.len()).map(|i| nonnegative + 2 * i));
+        for (i, observation) in self.observations.iter().enumerate() {
+            program.add_huber(nonnegative - 1 + 2 * i, self.huber, observation, unit);
+        }
+        for (chosen, current, stencil, limit) in [
+            (&limits.second, self.seconds(), &SECOND_DIFFERENCE[..], self.max_second),
+            (&limits.third, self.thirds(), &THIRD_DIFFERENCE[..], self.max_third),
+        ] {
+            for &k in chosen {
+                program.add_limit(k, stencil, unit / limit, &(current[k] / limit));
+            }
+        }
+        program
+    }
+
+    /// The limits that the path breaks after these increments.
+    fn broken(&self, increments: &[Vector3<f64>]) -> Limits {
+        let moved = increments.windows(2).zip(&self.steps).map(|(pair, step)| step + pair[1] - pair[0]);
+        let after = Self { steps: moved.collect(), ..self.without_observations() };
+        let beyond = |differences: Vec<Vector3<f64>>, limit: f64| {
+            let broken =
+                |(k, d): (usize, &Vector3<f64>)| (d.norm() > limit * (1.0 + LIMIT_SLACK)).then_some(k);
+            differences.iter().enumerate().filter_map(broken).collect()
+        };
+        Limits {
+            second: beyond(after.seconds(), self.max_second),
+            third: beyond(after.thirds(), self.max_third),
+        }
+    }
+
+    fn without_observations(&self) -> Self {
+        Self { observations: Vec::new(), steps: Vec::new(), bending: Vec::new(), ..*self }
+    }
+
+    fn all_limits(&self) -> Limits {
+        Limits { second: (0..self.steps.len() - 1).collect(), third: (0..self.steps.len() - 2).collect() }
+    }
+}
+
+/// Which second and third differences are bounded.
+struct Limits {
+    second: Vec<usize>,
+    third: Vec<usize>,
+}
+
+impl Limits {
+    fn add(&mut self, more: Self) {
+        for (list, more) in [(&mut self.second, more.second), (&mut self.third, more.third)] {
+            list.extend(more);
+            list.sort_unstable();
+            list.dedup();
+        }
+    }
+}
+
+/// A sparse matrix as it grows.
+#[derive(Default)]
+struct Triplets {
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Triplets {
+    fn push(&mut self, row: usize, column: usize, value: f64) {
+        self.rows.push(row);
+        self.columns.push(column);
+        self.values.push(value);
+    }
+
+    fn into_matrix(self, rows: usize, columns: usize) -> CscMatrix<f64> {
+        CscMatrix::new_from_triplets(rows, columns, self.rows, self.columns, self.values)
+    }
+}
+
+/// minimise ½ xᵀPx + qᵀx subject to Ax + s = b, s in cones. The first unknowns are the control points, axis by axis.
+struct Program {
+    quadratic: Triplets,
+    linear: Vec<f64>,
+    constraints: Triplets,
+    bounds: Vec<f64>,
+    cones: Vec<SupportedConeT<f64>>,
+}
+
+impl Program {
+    fn new(unknowns: usize) -> Self {
+        Self {
+            quadratic: Triplets::default(),
+            linear: vec![0.0; unknowns],
+            constraints: Triplets::default(),
+            bounds: Vec::new(),
+            cones: Vec::new(),
+        }
+    }
+
+    /// Adds ½‖offset + Σ stencil · φ‖² over the control points from `first`.
+    fn add_square(&mut self, first: usize, stencil: &[f64; 4], offset: &Vector3<f64>) {
+        for axis in 0..3 {
+            for (a, &of_a) in stencil.iter().enumerate() {
+                self.linear[3 * (first + a) + axis] += of_a * offset[axis];
+                for (b, &of_b) in stencil.iter().enumerate().skip(a) {
+                    self.quadratic.push(3 * (first + a) + axis, 3 * (first + b) + axis, of_a * of_b);
+                }
+            }
+        }
+    }
+
+    fn add_nonnegative(&mut self, unknowns: impl Iterator<Item = usize>) {
+        let first = self.bounds.len();
+        for unknown in unknowns {
+            self.constraints.push(self.bounds.len(), unknown, -1.0);
+            self.bounds.push(0.0);
+        }
+        self.cones.push(SupportedConeT::NonnegativeConeT(self.bounds.len() - first));
+    }
+
+    /// Adds ½s² + h t and the cone of an observation; unknowns s and t stand side by side.
+    fn add_huber(&mut self, s: usize, huber: f64, observation: &Observation, unit: f64) {
+        self.quadratic.push(s, s, 1.0);
+        self.linear[s + 1] = huber;
+        let bound = self.bounds.len();
+        self.constraints.push(bound, s, -1.0);
+        self.constraints.push(bound, s + 1, -1.0);
+        self.bounds.push(0.0);
+        for (support, residual) in observation.supports.iter().zip(&observation.residuals) {
+            let weights = support.weights.map(|weight| weight * unit / observation.sigma);
+            self.add_rows(support.first, &weights, &(residual / observation.sigma));
+        }
+        self.cones.push(SupportedConeT::SecondOrderConeT(7));
+    }
+
+    /// Bounds ‖offset + scale Σ stencil · φ‖ by 1.
+    fn add_limit(&mut self, first: usize, stencil: &[f64], scale: f64, offset: &Vector3<f64>) {
+        self.bounds.push(1.0);
+        let weights: Vec<f64> = stencil.iter().map(|c| -c * scale).collect();
+        self.add_rows(first, &weights, offset);
+        self.cones.push(SupportedConeT::SecondOrderConeT(4));
+    }
+
+    /// Three rows whose slack is `offset` - Σ weights · φ.
+    fn add_rows(&mut self, first: usize, weights: &[f64], offset: &Vector3<f64>) {
+        for axis in 0..3 {
+            for (k, &weight) in weights.iter().enumerate() {
+                self.constraints.push(self.bounds.len(), 3 * (first + k) + axis, weight);
+            }
+            self.bounds.push(offset[axis]);
+        }
+    }
+
+    /// The first `wanted` unknowns.
+    fn solve(self, wanted: usize) -> Result<Vec<f64>, String> {
+        let unknowns = self.linear.len();
+        let quadratic = self.quadratic.into_matrix(unknowns, unknowns);
+        let constraints = self.constraints.into_matrix(self.bounds.len(), unknowns);
+        let mut solver = DefaultSolver::new(
+            &quadratic,
+            &self.linear,
+            &constraints,
+            &self.bounds,
+            &self.cones,
+            solver_settings()?,
+        )
+        .map_err(|error| error.to_string())?;
+        solver.solve();
+        match solver.solution.status {
+            SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(solver.solution.x[..wanted].to_vec()),
+            status => Err(format!("{status:?}")),
+        }
+    }
+}
+
+fn solver_settings() -> Result<DefaultSettings<f64>, String> {
+    DefaultSettingsBuilder::default()
+        .verbose(false)
+        .max_threads(1)
+        // Unknowns are in standard deviations: a millionth of one is enough.
+        .tol_gap_abs(1e-6)
+        .tol_gap_rel(1e-6)
+        .tol_feas(1e-7)
+        .build()
+        .map_err(|error| error.to_string())
+}

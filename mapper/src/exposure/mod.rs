@@ -1,0 +1,11 @@
+//! Rendering of what a moving camera sees while its shutter is open.
+//!
+//! A blurred image is the mean, in linear light, of virtual views along the exposure (MBA-SLAM eq. 2 and 3). Depth
+//! and alpha are not blurred: they are those at mid exposure. The gradient of a loss goes back through every view to
+//! the Gaussians and to the poses at shutter opening and closing.
+
+mod renderer;
+mod scratch;
+
+pub use renderer::{ExposureGradient, ExposureRenderer};
+pub use scratch::ExposureScratch;

@@ -2,7 +2,9 @@
 
 mod chart;
 mod compare;
+mod detail;
 mod html;
+mod map_views;
 mod pictures;
 mod plots;
 pub mod table;
@@ -37,7 +39,8 @@ pub fn write(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<PathBuf> {
     }
     let report = run.folder.join(REPORT_FILE);
     let keyframes = compare::section(&pictures::keyframe_pictures(run, dataset)?);
-    write_whole(&report, &html::page(run, &plots, &keyframes))?;
+    let pictures = keyframes + &map_views::section(run, dataset)?;
+    write_whole(&report, &html::page(run, &plots, &pictures))?;
     Ok(report)
 }
 

@@ -1,5 +1,6 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 
+pub mod bundle;
 pub mod checkpoint;
 pub mod continuity;
 pub mod dataset;

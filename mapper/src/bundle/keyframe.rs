@@ -1,0 +1,123 @@
+//! What is observed in a keyframe, at full and at reduced resolutions.
+
+use mba_tracker::geometry::PinholeCamera;
+use mba_tracker::image::PixelRectangle;
+use mba_tracker::photometric::InverseResponse;
+use rayon::prelude::*;
+
+use crate::dataset::RgbdFrame;
+use crate::deblurring::ForwardResponse;
+
+/// A captured frame at one resolution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Observation {
+    /// Camera of this resolution.
+    pub camera: PinholeCamera,
+    /// Red, green and blue as stored, one plane each, row by row.
+    pub colour: [Vec<u8>; 3],
+    /// Depth at mid exposure in metres, row by row; 0 where missing.
+    pub depth: Vec<f32>,
+    /// Pixels that stem from the sensor; what is outside is not compared.
+    pub region: PixelRectangle,
+}
+
+/// A captured frame at full resolution and at halves of it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ObservationPyramid {
+    levels: Vec<Observation>,
+}
+
+/// How frames become observations.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    /// Camera of the frames.
+    pub camera: PinholeCamera,
+    /// Linear light of stored values.
+    pub inverse_response: InverseResponse,
+    /// Raw depth units per metre, positive.
+    pub depth_scale: f64,
+    /// Pixels of every frame that stem from the sensor.
+    pub region: PixelRectangle,
+}
+
+/// Depths of a 2x2 block count as one surface within this factor of the nearest.
+const SAME_SURFACE: f32 = 1.03;
+
+impl ObservationPyramid {
+    /// The frame at `levels` resolutions, at least one. Colours are averaged as light.
+    ///
+    /// Returns `None` if the frame's buffers do not have the size of the camera.
+    #[must_use]
+    pub fn new(sensor: &Sensor, frame: &RgbdFrame, levels: usize) -> Option<Self> {
+        let pixels = sensor.camera.width * sensor.camera.height;
+        if frame.rgb.len() != 3 * pixels || frame.depth.len() != pixels {
+            return None;
+        }
+        let plane = |channel: usize| frame.rgb.iter().skip(channel).step_by(3).copied().collect();
+        let metres = 1.0 / sensor.depth_scale;
+        let full = Observation {
+            camera: sensor.camera,
+            colour: [plane(0), plane(1), plane(2)],
+            depth: frame.depth.iter().map(|&raw| (f64::from(raw) * metres) as f32).collect(),
+            region: sensor.region,
+        };
+        let forward = ForwardResponse::new(&sensor.inverse_response);
+        let mut all = vec![full];
+        for level in 1..levels {
+            let finer = &all[level - 1];
+            if finer.camera.width < 32 || finer.camera.height < 32 {
+                break;
+            }
+            all.push(half(sensor, &forward, finer, level));
+        }
+        Some(Self { levels: all })
+    }
+
+    /// The frame at resolution `level`, where 0 is full; the coarsest there is if `level` is coarser.
+    #[must_use]
+    pub fn level(&self, level: usize) -> &Observation {
+        &self.levels[level.min(self.levels.len() - 1)]
+    }
+
+    /// Number of resolutions, at least 1.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.levels.len()
+    }
+
+    /// Whether there is no resolution, which is never so.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+}
+
+/// The four pixels of the finer level under each pixel of a coarser one.
+fn blocks(finer: &Observation) -> impl IndexedParallelIterator<Item = [usize; 4]> {
+    let stride = finer.camera.width;
+    let (width, height) = (stride / 2, finer.camera.height / 2);
+    (0..width * height).into_par_iter().map(move |pixel| {
+        let first = 2 * (pixel / width) * stride + 2 * (pixel % width);
+        [first, first + 1, first + stride, first + stride + 1]
+    })
+}
+
+fn half(sensor: &Sensor, forward: &ForwardResponse, finer: &Observation, level: usize) -> Observation {
+    let light = |byte: u8| sensor.inverse_response.linear_light(byte);
+    let colour = finer.colour.each_ref().map(|plane| {
+        let mean = |block: [usize; 4]| 0.25 * block.iter().map(|&pixel| light(plane[pixel])).sum::<f32>();
+        blocks(finer).map(|block| forward.encode(mean(block))).collect()
+    });
+    let depth = blocks(finer).map(|block| nearest_surface(block.map(|pixel| finer.depth[pixel]))).collect();
+    Observation { camera: sensor.camera.at_level(level), colour, depth, region: sensor.region.at_level(level) }
+}
+
+/// Mean depth of the nearest surface among four depths, 0 where none is known: across an edge there is no mean.
+fn nearest_surface(depths: [f32; 4]) -> f32 {
+    let known = depths.iter().copied().filter(|&depth| depth > 0.0);
+    let nearest = known.clone().fold(f32::INFINITY, f32::min);
+    let (sum, count) = known
+        .filter(|&depth| depth <= SAME_SURFACE * nearest)
+        .fold((0.0, 0.0), |(sum, count), depth| (sum + depth, count + 1.0));
+    if count > 0.0 { sum / count } else { 0.0 }
+}

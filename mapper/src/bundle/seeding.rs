@@ -1,0 +1,128 @@
+//! New Gaussians from a frame with depth, where the map has nothing yet.
+
+use mba_tracker::geometry::RigidTransform;
+use mba_tracker::photometric::InverseResponse;
+use nalgebra::Vector3;
+
+use super::keyframe::Observation;
+use crate::gaussians::{Gaussian, Gaussians};
+
+/// Side of the largest square that becomes one Gaussian, pixels.
+const LARGEST: usize = 16;
+/// Side of the smallest.
+const SMALLEST: usize = 2;
+/// Standard deviation of display values, 1 is full scale, above which a square is divided.
+const DETAIL: f32 = 0.03;
+/// Ratio of the largest to the smallest depth above which a square is divided.
+const STEP: f32 = 1.05;
+/// Standard deviation of a Gaussian across the surface, as a fraction of the side of its square.
+const SPREAD: f32 = 0.5;
+/// Opacity of a new Gaussian.
+const OPACITY: f32 = 0.9;
+/// A pixel is covered where the map's alpha is larger.
+const COVERED: f32 = 0.5;
+
+/// Appends Gaussians on the surface that `seen` shows from `world_from_camera`, one per square that is uniform in
+/// colour and depth, unless the middle of the square is covered according to `alpha` (row by row, as large as `seen`).
+///
+/// Adds at most `room` and returns how many.
+pub fn seed(
+    gaussians: &mut Gaussians,
+    seen: &Observation,
+    inverse_response: &InverseResponse,
+    world_from_camera: &RigidTransform,
+    alpha: &[f32],
+    room: usize,
+) -> usize {
+    let before = gaussians.len();
+    let squares = Squares { seen, inverse_response, world_from_camera, alpha };
+    let region = seen.region;
+    for top in (region.top..region.bottom).step_by(LARGEST) {
+        for left in (region.left..region.right).step_by(LARGEST) {
+            squares.divide([left, top], LARGEST, &mut |gaussian| {
+                if gaussians.len() - before < room {
+                    gaussians.push(gaussian);
+                }
+            });
+        }
+    }
+    gaussians.len() - before
+}
+
+struct Squares<'a> {
+    seen: &'a Observation,
+    inverse_response: &'a InverseResponse,
+    world_from_camera: &'a RigidTransform,
+    alpha: &'a [f32],
+}
+
+/// What a square looks like.
+struct Look {
+    mean_light: [f32; 3],
+    deviation: f32,
+    /// Nearest, median and farthest depth; `None` if too few pixels have one.
+    depth: Option<[f32; 3]>,
+}
+
+impl Squares<'_> {
+    fn divide(&self, [left, top]: [usize; 2], side: usize, emit: &mut impl FnMut(&Gaussian)) {
+        let region = self.seen.region;
+        let (right, bottom) = ((left + side).min(region.right), (top + side).min(region.bottom));
+        if left >= right || top >= bottom {
+            return;
+        }
+        let look = self.look([left, right], [top, bottom]);
+        let uneven = look.deviation > DETAIL || look.depth.is_some_and(|[near, _, far]| far > STEP * near);
+        if side > SMALLEST && (uneven || look.depth.is_none()) {
+            let half = side / 2;
+            for (x, y) in [(0, 0), (half, 0), (0, half), (half, half)] {
+                self.divide([left + x, top + y], half, emit);
+            }
+            return;
+        }
+        let middle = [0.5 * (left + right - 1) as f32, 0.5 * (top + bottom - 1) as f32];
+        let pixel = middle[1] as usize * self.seen.camera.width + middle[0] as usize;
+        if let Some([_, depth, _]) = look.depth
+            && self.alpha[pixel] < COVERED
+        {
+            emit(&self.gaussian(middle, depth, side, look.mean_light));
+        }
+    }
+
+    fn look(&self, [left, right]: [usize; 2], [top, bottom]: [usize; 2]) -> Look {
+        let width = self.seen.camera.width;
+        let pixels = (top..bottom).flat_map(|y| (left..right).map(move |x| y * width + x));
+        let mut light = [0.0; 3];
+        let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
+        let mut depths = Vec::with_capacity((right - left) * (bottom - top));
+        for pixel in pixels {
+            let bytes = self.seen.colour.each_ref().map(|plane| plane[pixel]);
+            light.iter_mut().zip(bytes).for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte));
+            let grey = bytes.iter().map(|&byte| f32::from(byte)).sum::<f32>() / (3.0 * 255.0);
+            (sum, squares, count) = (sum + grey, squares + grey * grey, count + 1.0);
+            if self.seen.depth[pixel] > 0.0 {
+                depths.push(self.seen.depth[pixel]);
+            }
+        }
+        let mean = sum / count;
+        let deviation = (squares / count - mean * mean).max(0.0).sqrt();
+        depths.sort_unstable_by(f32::total_cmp);
+        let enough = 2 * depths.len() >= (right - left) * (bottom - top) && !depths.is_empty();
+        let depth = enough.then(|| [depths[0], depths[depths.len() / 2], depths[depths.len() - 1]]);
+        Look { mean_light: light.map(|sum| sum / count), deviation, depth }
+    }
+
+    fn gaussian(&self, [u, v]: [f32; 2], depth: f32, side: usize, colour: [f32; 3]) -> Gaussian {
+        let camera = &self.seen.camera;
+        let point: Vector3<f64> = camera.ray(f64::from(u), f64::from(v)) * f64::from(depth);
+        let mean = self.world_from_camera.transform_point(&point).map(|x| x as f32).into();
+        let scale = SPREAD * side as f32 * depth / camera.fx as f32;
+        Gaussian {
+            mean,
+            log_scale: [scale.ln(); 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity_logit: (OPACITY / (1.0 - OPACITY)).ln(),
+            colour,
+        }
+    }
+}

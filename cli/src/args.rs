@@ -79,9 +79,10 @@ pub struct Demo {
 /// Arguments of `mba synth`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The data set has rgb/, depth/, sharp/, lists, calibration.toml, groundtruth.txt and \
-groundtruth_exposure.txt (poses at opening, middle and closing of the shutter). Equal options give equal \
-files.
+The data set has rgb/, depth/, lists, calibration.toml, groundtruth.txt and groundtruth_exposure.txt (poses \
+at opening, middle and closing of the shutter). For judging results there are sharp/, every frame without blur \
+and noise, and heldout_views/, such images from poses near the path, in poses.txt, that no frame has. Equal \
+options give equal files.
 
 Examples:
   mba synth --out data

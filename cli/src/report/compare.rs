@@ -1,6 +1,6 @@
 //! Pictures side by side, with a slider between before and after.
 
-use super::pictures::KeyframePictures;
+use super::pictures::{Detail, KeyframePictures};
 
 /// The section of the page; empty without pictures.
 pub(super) fn section(pictures: &[KeyframePictures]) -> String {
@@ -30,8 +30,9 @@ fn figure(pictures: &KeyframePictures) -> String {
         format!("\n<div class=\"pane\">{image}<span class=\"right\">truth</span></div>")
     });
     format!(
-        "<figure><div class=\"panes\">\n{first}{truth}\n</div><figcaption>{}</figcaption></figure>\n",
-        caption(pictures)
+        "<figure><div class=\"panes\">\n{first}{truth}\n</div><figcaption>{}</figcaption>{}</figure>\n",
+        caption(pictures),
+        pictures.detail.as_ref().map_or_else(String::new, |part| detail(pictures, part))
     )
 }
 
@@ -44,6 +45,25 @@ fn slider(pictures: &KeyframePictures, deblurred: &str, captured: &str) -> Strin
          <input type=\"range\" min=\"0\" max=\"100\" step=\"0.1\" value=\"50\" aria-label=\"captured or deblurred, frame {}\" \
          oninput=\"this.parentNode.style.setProperty('--cut', this.value + '%')\"></div>",
         pictures.index
+    )
+}
+
+/// The same part of all images side by side, each with its likeness to the truth.
+fn detail(pictures: &KeyframePictures, detail: &Detail) -> String {
+    let index = pictures.index;
+    let one = |kind: &str, base64: &str, ratio: Option<f64>| {
+        let ratio = ratio.map_or_else(String::new, |db| format!(", {db:.1} dB"));
+        format!(
+            "<div><img src=\"data:image/jpeg;base64,{base64}\" alt=\"frame {index}, detail, {kind}\">\
+             <p>{kind}{ratio}</p></div>\n"
+        )
+    };
+    let [captured, deblurred] = pictures.psnr.map_or([None; 2], |ratios| ratios.map(Some));
+    let truth = detail.truth.as_ref().map_or_else(String::new, |truth| one("truth", truth, None));
+    format!(
+        "\n<div class=\"detail\">\n{}{}{truth}</div>",
+        one("captured", &detail.captured, captured),
+        one("deblurred", &detail.deblurred, deblurred)
     )
 }
 
@@ -75,19 +95,33 @@ mod tests {
             captured: Some("Yw==".into()),
             truth: Some("dA==".into()),
             psnr: Some([23.26, 25.04]),
+            detail: Some(Detail {
+                captured: "Yw==".into(),
+                deblurred: "ZA==".into(),
+                truth: Some("dA==".into()),
+            }),
         }
     }
 
     #[test]
-    fn with_truth_there_are_three_pictures_and_the_figures() {
+    fn with_truth_there_are_three_pictures_three_details_and_the_figures() {
         let html = section(&[pictures()]);
-        assert_eq!((html.matches("<img").count(), html.matches("type=\"range\"").count()), (3, 1));
+        assert_eq!((html.matches("<img").count(), html.matches("type=\"range\"").count()), (6, 1));
+        for beneath in ["<p>captured, 23.3 dB</p>", "<p>deblurred, 25.0 dB</p>", "<p>truth</p>"] {
+            assert!(html.contains(beneath), "{html}");
+        }
         assert!(html.contains("captured 23.3 dB, deblurred 25.0 dB"), "{html}");
     }
 
     #[test]
     fn without_the_data_set_the_deblurred_picture_is_left() {
-        let html = section(&[KeyframePictures { captured: None, truth: None, psnr: None, ..pictures() }]);
+        let html = section(&[KeyframePictures {
+            captured: None,
+            truth: None,
+            psnr: None,
+            detail: None,
+            ..pictures()
+        }]);
         assert!(html.contains("base64,ZA==") && !html.contains("range") && !html.contains("dB"), "{html}");
     }
 

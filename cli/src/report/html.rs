@@ -1,17 +1,17 @@
 //! `report.html`: one file without network access.
 
 use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
-use mba_mapper::run::{Run, Spread, Summary};
+use mba_mapper::run::{MapFigures, Run, Spread, Summary};
 use serde_json::Value;
 
 use super::plots::Plot;
-use super::table::percent;
+use super::table::{map_rows, percent};
 
 const STYLE: &str = include_str!("style.css");
 
-/// The whole page; `keyframes` is its section with pictures.
+/// The whole page; `pictures` are its sections with pictures.
 #[must_use]
-pub(super) fn page(run: &Run, plots: &[Plot], keyframes: &str) -> String {
+pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
     let summary = &run.summary;
     let title = escape(&data_set_name(summary));
     let charts: String =
@@ -21,6 +21,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], keyframes: &str) -> String {
         spread_table(summary),
         summary.trajectory.as_ref().map(trajectory_table).unwrap_or_default(),
         summary.blur.as_ref().map(blur_table).unwrap_or_default(),
+        summary.map.as_ref().map(map_table).unwrap_or_default(),
         settings_table(summary),
     ];
     format!(
@@ -37,7 +38,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], keyframes: &str) -> String {
 <header><h1>{title}</h1><p>{folder}</p></header>
 {notices}<section class="tiles">
 {tiles}</section>
-{keyframes}<h2>Charts</h2>
+{pictures}<h2>Charts</h2>
 <section class="charts">
 {charts}</section>
 <h2>Figures</h2>
@@ -80,6 +81,12 @@ fn tiles(summary: &Summary) -> String {
         let near = figures.share_within_2cm;
         tiles.push(tile(&format!("{:.2} cm", 100.0 * figures.ate_m.rmse), "trajectory error (RMSE)", ""));
         tiles.push(tile(&percent(near), "of frames within 2 cm", grade(near, 0.95, 0.8)));
+    }
+    if let Some(psnr) = summary.map.and_then(|map| map.keyframe_psnr) {
+        tiles.push(tile(&format!("{psnr:.1} dB"), "deblurred keyframes (PSNR)", ""));
+    }
+    if let Some(psnr) = summary.map.and_then(|map| map.heldout_psnr) {
+        tiles.push(tile(&format!("{psnr:.1} dB"), "new views (PSNR)", ""));
     }
     if let Some(blur) = &summary.blur_px {
         tiles.push(tile(&format!("{:.1} px", blur.mean), "mean blur length", ""));
@@ -155,6 +162,12 @@ fn blur_table(figures: &BlurFigures) -> String {
     card("Motion within the exposure", &rows)
 }
 
+fn map_table(figures: &MapFigures) -> String {
+    let rows: Vec<[String; 2]> =
+        map_rows(figures).into_iter().map(|(label, value)| [label.to_owned(), value]).collect();
+    card("Map", &rows)
+}
+
 fn settings_table(summary: &Summary) -> String {
     let mut rows = vec![["frame rate".to_owned(), format!("{} per second", summary.settings.frame_rate)]];
     for (name, value) in &summary.settings.options {
@@ -189,7 +202,7 @@ fn card(title: &str, rows: &[[String; 2]]) -> String {
 }
 
 /// Text that is safe between and inside tags.
-fn escape(text: &str) -> String {
+pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

@@ -2,8 +2,10 @@
 
 mod chart;
 mod compare;
+mod detail;
 mod html;
 pub mod image_table;
+mod map_views;
 mod pictures;
 mod plots;
 pub mod table;
@@ -38,7 +40,8 @@ pub fn write(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<PathBuf> {
     }
     let report = run.folder.join(REPORT_FILE);
     let keyframes = compare::section(&pictures::keyframe_pictures(run, dataset)?);
-    write_whole(&report, &html::page(run, &plots, &keyframes))?;
+    let pictures = keyframes + &map_views::section(run, dataset)?;
+    write_whole(&report, &html::page(run, &plots, &pictures))?;
     Ok(report)
 }
 

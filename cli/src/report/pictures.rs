@@ -1,6 +1,6 @@
 //! Keyframes before and after deblurring, chosen and packed for the report.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
@@ -10,6 +10,8 @@ use image::{ImageReader, RgbImage};
 use mba_mapper::dataset::Dataset;
 use mba_mapper::evaluation::psnr;
 use mba_mapper::run::{Run, deblurred_path};
+
+use super::detail::{cut, most_textured};
 
 /// Most keyframes in a report.
 const MAX_KEYFRAMES: usize = 6;
@@ -40,6 +42,24 @@ pub(super) struct KeyframePictures {
     /// Peak signal-to-noise ratios in dB of captured and deblurred image against the truth, display values at full
     /// size.
     pub(super) psnr: Option<[f64; 2]>,
+    /// The most textured part of the images, if the data set is there.
+    pub(super) detail: Option<Detail>,
+}
+
+/// The same part of several images at full size, as JPEG in base64.
+#[derive(Clone, Debug)]
+pub(super) struct Detail {
+    pub(super) captured: String,
+    pub(super) deblurred: String,
+    pub(super) truth: Option<String>,
+}
+
+/// A keyframe that could be shown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Candidate {
+    index: usize,
+    blur_px: f64,
+    has_truth: bool,
 }
 
 /// The images of one keyframe at full size.
@@ -58,7 +78,7 @@ pub(super) fn keyframe_pictures(
     dataset: Option<&Dataset>,
 ) -> anyhow::Result<Vec<KeyframePictures>> {
     let images: Vec<Images> =
-        select(&deblurred_keyframes(run)).into_iter().filter_map(|key| read(run, dataset, key)).collect();
+        select(&candidates(run, dataset)).iter().filter_map(|key| read(run, dataset, key)).collect();
     let mut pictures = Vec::new();
     for width in WIDTHS {
         pictures = images.iter().map(|images| pack(images, width)).collect::<anyhow::Result<_>>()?;
@@ -69,29 +89,38 @@ pub(super) fn keyframe_pictures(
     Ok(pictures)
 }
 
-/// (index, blur) of the keyframes whose deblurred image is there.
-fn deblurred_keyframes(run: &Run) -> Vec<(usize, f64)> {
-    let blurs = run.frames.iter().enumerate().filter(|(_, frame)| frame.keyframe != 0);
-    blurs
-        .map(|(index, frame)| (index, frame.blur_px))
+/// The keyframes whose deblurred image is there.
+fn candidates(run: &Run, dataset: Option<&Dataset>) -> Vec<Candidate> {
+    let keyframes = run.frames.iter().enumerate().filter(|(_, frame)| frame.keyframe != 0);
+    keyframes
         .filter(|(index, _)| deblurred_path(&run.folder, *index).is_file())
+        .map(|(index, frame)| {
+            let has_truth = dataset.is_some_and(|dataset| truth_path(dataset, index).is_file());
+            Candidate { index, blur_px: frame.blur_px, has_truth }
+        })
         .collect()
 }
 
-/// The most blurred keyframe of each of several equal parts of the list.
-fn select(keyframes: &[(usize, f64)]) -> Vec<(usize, f64)> {
+/// The most blurred keyframe of each of several equal parts of the list, one with a sharp image if there is one.
+fn select(keyframes: &[Candidate]) -> Vec<Candidate> {
     let part = |k: usize| k * keyframes.len() / MAX_KEYFRAMES;
     let parts = (0..MAX_KEYFRAMES).map(|k| &keyframes[part(k)..part(k + 1)]);
-    parts.filter_map(|part| part.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1))).collect()
+    let order =
+        |a: &Candidate, b: &Candidate| a.has_truth.cmp(&b.has_truth).then(a.blur_px.total_cmp(&b.blur_px));
+    parts.filter_map(|part| part.iter().copied().max_by(order)).collect()
 }
 
-fn read(run: &Run, dataset: Option<&Dataset>, (index, blur_px): (usize, f64)) -> Option<Images> {
+/// Where a data set with ground truth keeps the sharp image of frame `index`.
+fn truth_path(dataset: &Dataset, index: usize) -> PathBuf {
+    dataset.folder().join("sharp").join(format!("{index:06}.png"))
+}
+
+fn read(run: &Run, dataset: Option<&Dataset>, candidate: &Candidate) -> Option<Images> {
+    let Candidate { index, blur_px, .. } = *candidate;
     let deblurred = read_image(&deblurred_path(&run.folder, index))?;
     let fits = |image: &RgbImage| image.dimensions() == deblurred.dimensions();
     let captured = dataset.and_then(|dataset| captured(dataset, index)).filter(fits);
-    let truth = dataset
-        .and_then(|dataset| read_image(&dataset.folder().join("sharp").join(format!("{index:06}.png"))))
-        .filter(fits);
+    let truth = dataset.and_then(|dataset| read_image(&truth_path(dataset, index))).filter(fits);
     Some(Images { index, blur_px, deblurred, captured, truth })
 }
 
@@ -116,11 +145,23 @@ fn pack(images: &Images, width: u32) -> anyhow::Result<KeyframePictures> {
         captured: captured.as_ref().map(jpeg).transpose()?,
         truth: truth.as_ref().map(jpeg).transpose()?,
         psnr: captured.as_ref().and_then(|captured| Some([ratio(captured)?, ratio(deblurred)?])),
+        detail: detail(images)?,
     })
 }
 
+fn detail(images: &Images) -> anyhow::Result<Option<Detail>> {
+    let Some(captured) = &images.captured else { return Ok(None) };
+    let part = most_textured(images.truth.as_ref().unwrap_or(&images.deblurred));
+    let jpeg = |image: &RgbImage| jpeg_base64(&cut(image, &part), part.width);
+    Ok(Some(Detail {
+        captured: jpeg(captured)?,
+        deblurred: jpeg(&images.deblurred)?,
+        truth: images.truth.as_ref().map(jpeg).transpose()?,
+    }))
+}
+
 /// The image, reduced to at most `width` columns, as a JPEG in base64.
-fn jpeg_base64(image: &RgbImage, width: u32) -> anyhow::Result<String> {
+pub(super) fn jpeg_base64(image: &RgbImage, width: u32) -> anyhow::Result<String> {
     let mut jpeg = Vec::new();
     let encoder = JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY);
     if image.width() > width {
@@ -134,8 +175,10 @@ fn jpeg_base64(image: &RgbImage, width: u32) -> anyhow::Result<String> {
 
 impl KeyframePictures {
     fn characters(&self) -> usize {
-        let optional = [&self.captured, &self.truth];
-        self.deblurred.len() + optional.into_iter().flatten().map(String::len).sum::<usize>()
+        let detail =
+            self.detail.iter().flat_map(|d| [Some(&d.captured), Some(&d.deblurred), d.truth.as_ref()]);
+        let whole = [Some(&self.deblurred), self.captured.as_ref(), self.truth.as_ref()];
+        whole.into_iter().chain(detail).flatten().map(String::len).sum()
     }
 }
 
@@ -145,11 +188,16 @@ mod tests {
 
     #[test]
     fn the_most_blurred_of_every_part_is_chosen() {
-        let keyframes: Vec<(usize, f64)> = (0..12).map(|k| (10 * k, [1.0, 2.0, 3.0][k % 3])).collect();
-        let indices: Vec<usize> = select(&keyframes).iter().map(|key| key.0).collect();
-        assert_eq!(indices, [10, 20, 50, 70, 80, 110]);
+        let candidate =
+            |k: usize| Candidate { index: 10 * k, blur_px: [1.0, 2.0, 3.0][k % 3], has_truth: false };
+        let mut keyframes: Vec<Candidate> = (0..12).map(candidate).collect();
+        let indices =
+            |keyframes: &[Candidate]| select(keyframes).iter().map(|key| key.index).collect::<Vec<_>>();
+        assert_eq!(indices(&keyframes), [10, 20, 50, 70, 80, 110]);
         assert_eq!(select(&keyframes[..4]), keyframes[..4]);
         assert!(select(&[]).is_empty());
+        keyframes[6].has_truth = true;
+        assert_eq!(indices(&keyframes), [10, 20, 50, 60, 80, 110], "a keyframe with truth goes first");
     }
 
     #[test]

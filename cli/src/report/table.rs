@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
-use mba_mapper::run::{Spread, Summary};
+use mba_mapper::run::{MapFigures, Spread, Summary};
 
 /// The table of a trajectory evaluation, lengths in metres, angles in degrees.
 #[must_use]
@@ -48,7 +48,12 @@ pub fn summary(summary: &Summary) -> String {
     rows.extend(summary.milliseconds.iter().map(|s| ("time per frame", spread(s, "ms"))));
     rows.extend(summary.blur_px.iter().map(|s| ("estimated blur", spread(s, "px"))));
     let mut text = pairs(&rows);
-    for part in [summary.trajectory.as_ref().map(trajectory), summary.blur.as_ref().map(blur)] {
+    let parts = [
+        summary.trajectory.as_ref().map(trajectory),
+        summary.blur.as_ref().map(blur),
+        summary.map.as_ref().map(map),
+    ];
+    for part in parts {
         text.extend(part.map(|part| "\n".to_owned() + &part));
     }
     text
@@ -68,6 +73,39 @@ pub fn blur(figures: &BlurFigures) -> String {
     ])
 }
 
+/// The table of a map.
+#[must_use]
+pub fn map(figures: &MapFigures) -> String {
+    pairs(&map_rows(figures))
+}
+
+/// Label and value of everything that is known of a map.
+#[must_use]
+pub fn map_rows(figures: &MapFigures) -> Vec<(&'static str, String)> {
+    let MapFigures { gaussians, iterations, seconds, peak_memory_bytes, loss, keyframes, .. } = figures;
+    let mut rows = vec![
+        ("Gaussians", gaussians.to_string()),
+        ("keyframes in the map", keyframes.to_string()),
+        ("iterations", format!("{iterations} in {seconds:.0} s")),
+        ("loss at the end", format!("{loss:.5}")),
+    ];
+    if *peak_memory_bytes > 0 {
+        rows.push(("peak memory", format!("{:.0} MB", *peak_memory_bytes as f64 / 1e6)));
+    }
+    let captured = figures.keyframe_psnr_captured.map(|db| format!("{db:.2} dB"));
+    rows.extend(captured.map(|text| ("keyframes as captured", text)));
+    let likeness = [
+        ("keyframes deblurred", figures.keyframe_psnr, figures.keyframe_ssim),
+        ("views held out", figures.heldout_psnr, figures.heldout_ssim),
+    ];
+    for (label, psnr, ssim) in likeness {
+        let parts = [psnr.map(|db| format!("{db:.2} dB")), ssim.map(|ssim| format!("SSIM {ssim:.4}"))];
+        let text = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
+        rows.extend((!text.is_empty()).then_some((label, text)));
+    }
+    rows
+}
+
 /// Lines of label and value.
 #[must_use]
 pub fn pairs(rows: &[(&str, String)]) -> String {
@@ -82,4 +120,34 @@ pub fn percent(share: f64) -> String {
 
 fn scale_row(scale: f64) -> String {
     if scale == 1.0 { String::new() } else { pairs(&[("scale of the estimate", format!("{scale:.6}"))]) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_known_of_a_map_is_left_out() {
+        let figures = MapFigures { gaussians: 50_000, iterations: 900, seconds: 61.4, ..Default::default() };
+        let text = map(&figures);
+        assert!(text.contains("50000") && text.contains("900 in 61 s"), "{text}");
+        assert!(!text.contains("dB") && !text.contains("memory"), "{text}");
+        let with_truth = MapFigures {
+            peak_memory_bytes: 1_234_000_000,
+            keyframe_psnr_captured: Some(24.0),
+            keyframe_psnr: Some(30.126),
+            keyframe_ssim: Some(0.91),
+            heldout_ssim: Some(0.875),
+            ..figures
+        };
+        let lines = map(&with_truth);
+        for line in [
+            "peak memory             1234 MB\n",
+            "keyframes as captured   24.00 dB\n",
+            "keyframes deblurred     30.13 dB, SSIM 0.9100\n",
+            "views held out          SSIM 0.8750\n",
+        ] {
+            assert!(lines.contains(line), "{lines}");
+        }
+    }
 }

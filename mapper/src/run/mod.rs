@@ -26,7 +26,7 @@ pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
 pub use merit::{Merit, mid_pose};
 pub use reader::Run;
-pub use summary::{FrameCounts, RunSettings, Spread, Summary};
+pub use summary::{FrameCounts, MapFigures, RunSettings, Spread, Summary};
 pub use writer::RunWriter;
 
 /// Name of the trajectory at mid exposure.

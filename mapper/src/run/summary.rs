@@ -47,6 +47,9 @@ pub struct Summary {
     pub trajectory: Option<TrajectoryFigures>,
     /// Figures of merit of the exposures, when the data set has ground truth for them.
     pub blur: Option<BlurFigures>,
+    /// What is known of the map, when the run made one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<MapFigures>,
     /// Oddities of the input, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -74,6 +77,40 @@ impl FrameCounts {
     pub fn tracked_share(&self) -> f64 {
         (self.ok + self.weak) as f64 / self.total.max(1) as f64
     }
+}
+
+/// What making a map took and how good the map is. Images are compared as 8-bit display values, means are over
+/// images; each figure of merit is absent when the data set lacks the images for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MapFigures {
+    /// Gaussians in the map.
+    pub gaussians: usize,
+    /// Iterations of the optimiser.
+    pub iterations: usize,
+    /// Time for making the map, seconds.
+    pub seconds: f64,
+    /// Most memory that the process had at a time, bytes; 0 where the system does not tell.
+    pub peak_memory_bytes: u64,
+    /// Loss at the end, finite.
+    pub loss: f64,
+    /// Keyframes that took part.
+    pub keyframes: usize,
+    /// PSNR of the captured keyframes against the data set's sharp images, dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keyframe_psnr_captured: Option<f64>,
+    /// PSNR of the deblurred keyframes against the data set's sharp images, dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keyframe_psnr: Option<f64>,
+    /// SSIM of the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub keyframe_ssim: Option<f64>,
+    /// PSNR of rendered views against the data set's held-out ones, dB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heldout_psnr: Option<f64>,
+    /// SSIM of the same.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heldout_ssim: Option<f64>,
 }
 
 /// Where the bulk and the tail of a quantity lie.
@@ -130,7 +167,21 @@ impl Summary {
             blur_px: Spread::of(&blurs),
             trajectory: None,
             blur: None,
+            map: None,
             warnings: Vec::new(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_of_a_map_may_be_missing() {
+        let figures: MapFigures = serde_json::from_str(r#"{"gaussians": 7, "keyframe_psnr": 30.5}"#).unwrap();
+        assert_eq!(figures, MapFigures { gaussians: 7, keyframe_psnr: Some(30.5), ..Default::default() });
+        let text = serde_json::to_string(&figures).unwrap();
+        assert!(text.contains("\"loss\":0.0") && !text.contains("heldout"), "{text}");
     }
 }

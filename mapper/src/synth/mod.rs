@@ -24,6 +24,7 @@ mod depth_sensor;
 mod description;
 mod develop;
 mod error;
+mod heldout;
 mod motion;
 mod random;
 mod render;

@@ -5,11 +5,13 @@ use mba_tracker::trajectory::ExposureTrajectory;
 
 use super::blur::{self, BlurFigure, ExposurePoses};
 use super::develop::Developer;
+use super::heldout;
 use super::motion::CameraPath;
 use super::render::{self, Size, SubFrame, TURNED_GRID};
 use super::scene::Scene;
 use super::view::View;
 use super::{SynthConfig, SynthError};
+use crate::trajectory_file::TimedPose;
 
 /// Mid exposure of the first frame, seconds.
 const FIRST_TIMESTAMP: f64 = 0.1;
@@ -166,6 +168,13 @@ impl SynthSequence {
         let rays = TURNED_GRID.map(|offset| SubFrame { view, offset });
         let radiance = render::radiance(&self.scene, self.size(), &rays);
         Developer { noise: None, ..self.developer() }.develop(&radiance, self.camera.width, 0)
+    }
+
+    /// Poses near the camera's path, between frames and a little beside it, in order of time; with
+    /// [`Self::render_view`] they test whether a map shows more than its own images.
+    #[must_use]
+    pub fn heldout_poses(&self) -> Vec<TimedPose> {
+        heldout::poses(self)
     }
 
     fn render_depth(&self, index: usize) -> Vec<u16> {

@@ -180,6 +180,24 @@ fn gyroscope_integrates_to_the_orientation() {
 }
 
 #[test]
+fn held_out_views_lie_between_frames_and_near_the_path() {
+    let sequence = sequence(SynthConfig { frames: 90, ..small() });
+    let views = sequence.heldout_poses();
+    assert_eq!(views.len(), 12);
+    assert!(views.windows(2).all(|pair| pair[0].timestamp < pair[1].timestamp));
+    for view in &views {
+        let frame = (view.timestamp - sequence.timestamp(0)) * sequence.config().frame_rate;
+        assert!((frame.fract() - 0.5).abs() < 1e-3 && frame < 89.0, "at frame {frame}");
+        let path = sequence.world_from_camera(view.timestamp);
+        let beside = path.tangent_to(&view.world_from_camera);
+        let (shift, turn) = (beside.fixed_rows::<3>(0).norm(), beside.fixed_rows::<3>(3).norm());
+        assert!((0.025..0.05).contains(&shift) && (0.015..0.05).contains(&turn), "{shift} m, {turn} rad");
+    }
+    let still = self::sequence(SynthConfig { frames: 1, ..small() });
+    assert_eq!(still.heldout_poses().len(), 1);
+}
+
+#[test]
 fn settings_out_of_range_are_named() {
     let message = |config| SynthSequence::new(config).err().unwrap().to_string();
     assert_eq!(message(SynthConfig { frames: 0, ..small() }), "frames 0: expected 1 to 100000");
@@ -223,6 +241,14 @@ fn written_sequence_opens_as_a_data_set() {
     assert_eq!(stored.into_raw(), rendered.rgb);
     let stored = image::open(path.join("depth/000002.png")).unwrap().into_luma16();
     assert_eq!(stored.into_raw(), rendered.depth);
+
+    let [view] = crate::trajectory_file::read_trajectory(&path.join("heldout_views/poses.txt"))
+        .unwrap()
+        .try_into()
+        .expect("one view for three frames");
+    let stored = image::open(path.join("heldout_views/000000.png")).unwrap().into_rgb8();
+    let ratio = psnr(&stored, &sequence.render_view(&view.world_from_camera));
+    assert!(ratio > 60.0, "the pose has nine decimals: {ratio} dB");
 
     let again = super::write_dataset(&sequence, &path, |_, _| ()).unwrap_err();
     assert!(matches!(again, SynthError::FolderNotEmpty { .. }), "{again}");

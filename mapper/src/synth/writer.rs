@@ -35,8 +35,11 @@ struct Written {
 /// Rate of the gyroscope samples, Hz.
 const GYRO_HERTZ: f64 = 200.0;
 
+/// Folder of the views that no frame sees.
+const HELDOUT_FOLDER: &str = "heldout_views";
+
 /// Renders the sequence into `folder` in the native layout (TUM lists, `calibration.toml`) with ground truth,
-/// sharp images, blur figures, gyroscope rates and a README. Calls `progress(done, frames)` after each frame, from
+/// sharp images, held-out views, blur figures, gyroscope rates and a README. Calls `progress(done, frames)` after each frame, from
 /// any thread and in any order.
 ///
 /// The folder is made if it does not exist. The calibration is written last, so that a folder with it is complete.
@@ -60,6 +63,7 @@ pub fn write_dataset(
         (0..sequence.len()).into_par_iter().map(write_counted).collect::<Result<_, SynthError>>()?;
     let summary = summarise(&written);
     write_ground_truth(sequence, folder)?;
+    write_heldout_views(sequence, folder)?;
     let texts = [
         ("rgb.txt", image_list(sequence, "rgb")),
         ("depth.txt", image_list(sequence, "depth")),
@@ -82,7 +86,7 @@ fn prepare(folder: &Path) -> Result<(), SynthError> {
     if fs::read_dir(folder).map_err(unwritable)?.next().is_some() {
         return Err(SynthError::FolderNotEmpty { folder: folder.to_owned() });
     }
-    for name in ["rgb", "depth", "sharp"] {
+    for name in ["rgb", "depth", "sharp", HELDOUT_FOLDER] {
         let path = folder.join(name);
         fs::create_dir(&path).map_err(|reason| SynthError::unwritable(path, reason))?;
     }
@@ -144,6 +148,18 @@ fn write_ground_truth(sequence: &SynthSequence, folder: &Path) -> Result<(), Syn
     write_trajectory(&folder.join("groundtruth.txt"), &poses)?;
     write_exposures(&folder.join("groundtruth_exposure.txt"), &exposures)?;
     Ok(())
+}
+
+/// Images named by their line in `poses.txt`, from zero.
+fn write_heldout_views(sequence: &SynthSequence, folder: &Path) -> Result<(), SynthError> {
+    let folder = folder.join(HELDOUT_FOLDER);
+    let size = [sequence.camera().width, sequence.camera().height];
+    let poses = sequence.heldout_poses();
+    poses.par_iter().enumerate().try_for_each(|(index, pose)| {
+        let rgb = sequence.render_view(&pose.world_from_camera);
+        write_png::<Rgb<u8>>(&folder.join(format!("{index:06}.png")), size, rgb)
+    })?;
+    Ok(write_trajectory(&folder.join("poses.txt"), &poses)?)
 }
 
 /// `rgb.txt` or `depth.txt`. Writing to a string cannot fail.

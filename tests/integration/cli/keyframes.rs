@@ -73,7 +73,8 @@ fn keyframes_are_deblurred_and_shown() {
     let page = report();
     let shown = expected.len().min(6);
     assert!(page.contains("Keyframes, before and after"));
-    assert_eq!((page.matches("<img").count(), page.matches(" dB, deblurred").count()), (3 * shown, shown));
+    assert_eq!((page.matches("<img").count(), page.matches(" dB, deblurred").count()), (6 * shown, shown));
+    assert_eq!(page.matches("<p>deblurred, ").count(), shown, "each detail has its ratio beneath");
     fs::rename(place.path().join("data"), place.path().join("elsewhere")).unwrap();
     assert_eq!(report().matches("<img").count(), shown, "without the data set the deblurred images are left");
 }

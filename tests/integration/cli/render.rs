@@ -170,6 +170,26 @@ fn size_focal_length_and_names_can_be_chosen() {
 }
 
 #[test]
+fn the_report_shows_the_map() {
+    let place = workplace(Some(camera()));
+    let run = place.path().join("run");
+    let page = || {
+        assert_eq!(mba([Path::new("report"), &run]).code, Some(0));
+        fs::read_to_string(run.join("report.html")).unwrap()
+    };
+    let shown = page();
+    assert!(shown.contains("3 Gaussians, 0.0 MB"), "{shown}");
+    // Without keyframes, the first, the middle and the last frame.
+    for frame in [0, 2, 4] {
+        assert!(shown.contains(&format!("Rendered from frame {frame}.")), "frame {frame}");
+    }
+    fs::write(run.join("map.ply"), "not a map").unwrap();
+    assert!(page().contains("is not a PLY file"));
+    fs::remove_file(run.join("map.ply")).unwrap();
+    assert!(!page().contains("<h2>Map</h2>"));
+}
+
+#[test]
 fn what_cannot_be_rendered_is_named() {
     let place = workplace(Some(camera()));
     let write = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();

@@ -1,0 +1,75 @@
+//! Frames between keyframes: fitted to the finished map.
+
+use mba_tracker::geometry::RigidTransform;
+
+use super::MapSettings;
+use super::prepare::{Frames, observation, sensor};
+use crate::bundle::{BundleAdjustment, typical_depth};
+use crate::dataset::Dataset;
+use crate::run::FrameStatus;
+use crate::trajectory_file::TimedExposure;
+
+/// Steps per frame.
+const STEPS: usize = 24;
+
+/// Exposures and logarithms of the gains of all frames: those of keyframes as they were refined, those of the others
+/// fitted to the map, starting from the tracked ones moved along with the keyframe next to them. Lost frames and those
+/// that cannot be read are only moved along.
+pub(super) fn all_exposures(
+    dataset: &Dataset,
+    bundle: &mut BundleAdjustment,
+    frames: &Frames,
+    settings: &MapSettings,
+    mut observe: impl FnMut(),
+) -> Vec<(TimedExposure, f64)> {
+    let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
+    let sensor = sensor(dataset);
+    let mut all = Vec::with_capacity(dataset.len());
+    for (index, tracked) in frames.exposures.iter().enumerate() {
+        let timestamp = tracked.timestamp;
+        let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
+        if keyframes[next] == index {
+            let state = &bundle.state.frames[next];
+            all.push((state.path.timed(timestamp), state.log_gain));
+            continue;
+        }
+        let nearest = nearest(&keyframes, next, index);
+        let before = &frames.exposures[keyframes[nearest]].mid;
+        let reference = &bundle.state.frames[nearest];
+        let moved: RigidTransform = reference.path.mid().compose(&before.inverse());
+        let mut state = frames.state(index, settings);
+        state.path = state.path.seen_from(&moved);
+        state.log_gain = reference.log_gain;
+        if frames.records[index].status != FrameStatus::Lost
+            && let Ok(observation) = observation(dataset, &sensor, index)
+        {
+            let depth = typical_depth(observation.level(0));
+            bundle.fit_frame(&observation, depth, &frames.priors[index], &mut state, STEPS);
+            observe();
+        }
+        all.push((state.path.timed(timestamp), state.log_gain));
+    }
+    all
+}
+
+/// Which keyframe is nearest to frame `index`, `next` being the first after it.
+fn nearest(keyframes: &[usize], next: usize, index: usize) -> usize {
+    match next.checked_sub(1) {
+        Some(previous) if index - keyframes[previous] < keyframes[next].abs_diff(index) => previous,
+        _ => next,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_keyframe_may_be_on_either_side() {
+        let keyframes = [4, 10];
+        assert_eq!(nearest(&keyframes, 0, 1), 0);
+        assert_eq!(nearest(&keyframes, 1, 5), 0);
+        assert_eq!(nearest(&keyframes, 1, 9), 1);
+        assert_eq!(nearest(&keyframes, 1, 15), 1);
+    }
+}

@@ -1,0 +1,200 @@
+//! The run from start to end.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use super::between::all_exposures;
+use super::output::{self, CHECKPOINT_FILE};
+use super::prepare::{self, Frames};
+use super::{MapError, MapSettings, merit};
+use crate::bundle::{BundleAdjustment, BundleState};
+use crate::checkpoint::{Fingerprint, Identity, load, save};
+use crate::dataset::Dataset;
+use crate::run::{MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
+
+/// A checkpoint is written when this much time has passed.
+const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
+
+/// Share of the time budget that is for seeding, the frames between keyframes, and writing.
+const BUDGET_RESERVE: f64 = 0.1;
+
+/// Layout of the checkpoint's content.
+const CHECKPOINT_VERSION: u32 = 1;
+
+/// Memory of the smoothed loss, steps.
+const SMOOTHING: f64 = 50.0;
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapProgress {
+    /// Share of the adjustment that is done, 0 to 1.
+    pub position: f64,
+    /// Steps so far.
+    pub steps: usize,
+    /// Gaussians now.
+    pub gaussians: usize,
+    /// Loss, mean of the last steps.
+    pub loss: f64,
+    /// PSNR of blurred renderings against captured frames in dB, of the mean square of the last steps.
+    pub psnr: f64,
+}
+
+/// All that is needed to go on.
+#[derive(Serialize, Deserialize)]
+struct Saved {
+    state: BundleState,
+    running: Running,
+}
+
+/// What the driver keeps of the steps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Running {
+    seconds: f64,
+    loss: f64,
+    mean_square: f64,
+}
+
+impl Running {
+    fn add(&mut self, loss: f64, mean_square: f64, steps: usize) {
+        let share = 1.0 / (steps as f64).clamp(1.0, SMOOTHING);
+        self.loss += share * (loss - self.loss);
+        self.mean_square += share * (mean_square - self.mean_square);
+    }
+}
+
+/// Maps `dataset` from the poses of `run` into the RUN folder `out`. With `resume`, goes on from the checkpoint in
+/// `out` if there is one. `describe` becomes the settings of the new run; `observe` is called after every step.
+///
+/// # Errors
+/// See [`MapError`]. What was done before stays in `out`.
+pub fn map_dataset(
+    dataset: &Dataset,
+    run: &Run,
+    settings: &MapSettings,
+    out: &Path,
+    resume: bool,
+    describe: RunSettings,
+    mut observe: impl FnMut(MapProgress),
+) -> Result<Summary, MapError> {
+    let started = Instant::now();
+    let mut frames = Frames::new(dataset, run)?;
+    let identity = identity(dataset, run, settings);
+    let checkpoint = out.join(CHECKPOINT_FILE);
+    let saved: Option<Saved> =
+        if resume && checkpoint.is_file() { Some(load(&checkpoint, &identity)?) } else { None };
+    let mut writer = RunWriter::create(out, describe)?;
+    output::push_tracked(&mut writer, &frames)?;
+    let mut bundle = prepare::bundle(dataset, &mut frames, settings)?;
+    let mut running = Running::default();
+    match saved {
+        Some(saved) => (bundle.state, running) = (saved.state, saved.running),
+        None => bundle.seed(),
+    }
+    if bundle.state.gaussians.is_empty() {
+        return Err(MapError::NoDepth);
+    }
+    let earlier = running.seconds;
+    let adjustment = Adjustment { settings, checkpoint: &checkpoint, identity: &identity, started, earlier };
+    adjustment.run(&mut bundle, &mut running, &mut observe)?;
+    frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
+
+    let refined = all_exposures(dataset, &mut bundle, &frames, settings, || ());
+    let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
+    let (exposures, repairs) = frames.repair(dataset, &exposures)?;
+    repairs.into_iter().for_each(|repair| writer.warn(repair));
+    let gains: Vec<f64> = refined.iter().map(|(_, log_gain)| log_gain.exp()).collect();
+    output::write(&mut writer, dataset, &bundle, &exposures, &gains)?;
+    let figures = MapFigures {
+        gaussians: bundle.state.gaussians.len(),
+        iterations: bundle.state.steps,
+        seconds: earlier + started.elapsed().as_secs_f64(),
+        peak_memory_bytes: output::peak_memory_bytes(),
+        loss: running.loss,
+        keyframes: bundle.keyframes().len(),
+        ..merit::image_figures(dataset, &bundle, writer.folder(), &exposures)
+    };
+    let merit = Merit::of(&exposures, dataset);
+    let summary = writer.finish(|summary| {
+        summary.trajectory = merit.trajectory;
+        summary.blur = merit.blur;
+        summary.map = Some(figures);
+    })?;
+    output::remove_checkpoint(out)?;
+    Ok(summary)
+}
+
+/// The loop of steps and what belongs to it.
+struct Adjustment<'a> {
+    settings: &'a MapSettings,
+    checkpoint: &'a Path,
+    identity: &'a Identity,
+    started: Instant,
+    /// Seconds that earlier parts of the run took.
+    earlier: f64,
+}
+
+impl Adjustment<'_> {
+    fn run(
+        &self,
+        bundle: &mut BundleAdjustment,
+        running: &mut Running,
+        observe: &mut impl FnMut(MapProgress),
+    ) -> Result<(), MapError> {
+        let budget = self.settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
+        let mut last_saved = Instant::now();
+        while bundle.state.position < 1.0 {
+            let steps = bundle.state.steps;
+            let report = bundle.step(budget.is_some(), |schedule| match budget {
+                None => (steps + 1) as f64 / schedule.steps().max(1) as f64,
+                Some(budget) => self.seconds() / budget,
+            });
+            let Some(report) = report else { break };
+            running.add(report.terms.total(), report.terms.mean_square, bundle.state.steps);
+            observe(MapProgress {
+                position: bundle.state.position.min(1.0),
+                steps: bundle.state.steps,
+                gaussians: bundle.state.gaussians.len(),
+                loss: running.loss,
+                psnr: -10.0 * running.mean_square.log10(),
+            });
+            if last_saved.elapsed() >= CHECKPOINT_INTERVAL {
+                self.save(bundle, running)?;
+                last_saved = Instant::now();
+            }
+        }
+        Ok(())
+    }
+
+    /// Time for the map so far, earlier parts of the run included.
+    fn seconds(&self) -> f64 {
+        self.earlier + self.started.elapsed().as_secs_f64()
+    }
+
+    fn save(&self, bundle: &BundleAdjustment, running: &Running) -> Result<(), MapError> {
+        #[derive(Serialize)]
+        struct Saving<'a> {
+            state: &'a BundleState,
+            running: Running,
+        }
+        let running = Running { seconds: self.seconds(), ..*running };
+        save(self.checkpoint, self.identity, &Saving { state: &bundle.state, running })?;
+        Ok(())
+    }
+}
+
+/// What a checkpoint has to agree with.
+fn identity(dataset: &Dataset, run: &Run, settings: &MapSettings) -> Identity {
+    let calibration = dataset.calibration();
+    let camera = calibration.camera;
+    let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
+    let exposures: Vec<String> = run.exposures.iter().map(|exposure| format!("{exposure:?}")).collect();
+    let records: Vec<String> = run.frames.iter().map(|record| format!("{record:?}")).collect();
+    Identity {
+        program: Fingerprint::of(&(env!("CARGO_PKG_VERSION"), CHECKPOINT_VERSION)),
+        dataset: Fingerprint::of(&(dataset.name(), format!("{calibration:?}"), stamps)),
+        trajectory: Fingerprint::of(&(exposures, records)),
+        settings: Fingerprint::of(&settings.decisive(camera.width * camera.height)),
+    }
+}

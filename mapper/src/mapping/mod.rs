@@ -1,0 +1,20 @@
+//! From a tracked run to a map: keyframes are chosen, their exposures repaired, the bundle adjusted, the frames between
+//! keyframes fitted to the map, and everything written into a RUN folder.
+//!
+//! A run that is stopped at any moment leaves a RUN folder with the tracked poses and a checkpoint; started again with
+//! `resume` it ends with the same files, bit for bit, as one that was never stopped. Only a time budget makes results
+//! depend on how fast the machine is.
+
+mod between;
+mod choice;
+mod driver;
+mod error;
+mod merit;
+mod output;
+mod prepare;
+mod settings;
+
+pub use driver::{MapProgress, map_dataset};
+pub use error::MapError;
+pub use output::{CHECKPOINT_FILE, DEPTH_FOLDER};
+pub use settings::MapSettings;

@@ -1,0 +1,154 @@
+//! From a run to a bundle that can be adjusted.
+
+use mba_tracker::SimdLevel;
+use mba_tracker::trajectory::ExposureTrajectory;
+use rayon::prelude::*;
+
+use super::choice::choose_keyframes;
+use super::{MapError, MapSettings};
+use crate::bundle::{
+    BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor, typical_depth,
+};
+use crate::continuity::{
+    ContinuitySettings, FrameVerdict, RepairedRun, predict_motions, repair_run, run_frames,
+};
+use crate::dataset::Dataset;
+use crate::exposure::ExposurePath;
+use crate::run::{FrameRecord, Run};
+use crate::trajectory_file::TimedExposure;
+
+/// Resolutions of an observation: full and half.
+const LEVELS: usize = 2;
+
+/// Largest difference between the times of a frame in the run and in the data set, seconds.
+const SAME_TIME: f64 = 1e-4;
+
+/// What every frame of the data set starts with.
+pub(super) struct Frames {
+    /// Tracked exposures, repaired.
+    pub(super) exposures: Vec<TimedExposure>,
+    /// What was said of them when they were tracked.
+    pub(super) records: Vec<FrameRecord>,
+    /// What the neighbours say about each motion.
+    pub(super) priors: Vec<PathPrior>,
+    /// What was odd, one sentence each.
+    pub(super) warnings: Vec<String>,
+}
+
+/// How frames of the data set become observations.
+pub(super) fn sensor(dataset: &Dataset) -> Sensor {
+    let calibration = dataset.calibration();
+    Sensor {
+        camera: calibration.camera,
+        inverse_response: calibration.response.inverse(),
+        depth_scale: calibration.depth_scale,
+        region: dataset.region_with_source(),
+    }
+}
+
+impl Frames {
+    /// Repairs the exposures of a run.
+    pub(super) fn new(dataset: &Dataset, run: &Run) -> Result<Self, MapError> {
+        check_frames(dataset, run)?;
+        let seconds = exposure_seconds(dataset);
+        let settings = ContinuitySettings::default();
+        let repaired = repair_run(&run.exposures, &run.frames, &seconds, &settings)?;
+        let frames = run_frames(&repaired.exposures, &run.frames, &seconds)?;
+        let priors = predict_motions(&frames, &settings).into_iter().map(|motion| PathPrior { motion }).collect();
+        let warnings = repairs(&repaired, "before");
+        Ok(Self { exposures: repaired.exposures, records: run.frames.clone(), priors, warnings })
+    }
+
+    /// Repairs exposures that were refined, and tells what was done.
+    pub(super) fn repair(
+        &self,
+        dataset: &Dataset,
+        refined: &[TimedExposure],
+    ) -> Result<(Vec<TimedExposure>, Vec<String>), MapError> {
+        let settings = ContinuitySettings::default();
+        let repaired = repair_run(refined, &self.records, &exposure_seconds(dataset), &settings)?;
+        let warnings = repairs(&repaired, "after");
+        Ok((repaired.exposures, warnings))
+    }
+
+    /// First estimate of a frame's path.
+    pub(super) fn state(&self, index: usize, settings: &MapSettings) -> FrameState {
+        let path = ExposurePath::through(&self.exposures[index]);
+        FrameState::new(if settings.blur {
+            path
+        } else {
+            ExposurePath::linear(ExposureTrajectory::still(path.mid()))
+        })
+    }
+}
+
+/// The bundle with an empty map, and the index in the data set of every keyframe; frames that cannot be read are left
+/// out with a warning.
+pub(super) fn bundle(
+    dataset: &Dataset,
+    frames: &mut Frames,
+    settings: &MapSettings,
+) -> Result<BundleAdjustment, MapError> {
+    let sensor = sensor(dataset);
+    let chosen = choose_keyframes(&frames.records, settings.max_keyframes);
+    let load = |&index: &usize| (index, observation(dataset, &sensor, index));
+    let loaded: Vec<_> = chosen.par_iter().map(load).collect();
+    let mut keyframes = Vec::new();
+    for (index, observation) in loaded {
+        match observation {
+            Ok(observation) => {
+                let depth = typical_depth(observation.level(0));
+                keyframes.push(Keyframe { index, observation, prior: frames.priors[index], depth });
+            }
+            Err(reason) => frames.warnings.push(format!("keyframe {index} left out: {reason}")),
+        }
+    }
+    if keyframes.is_empty() {
+        let reason = frames.warnings.last().cloned().unwrap_or_else(|| "all frames are lost".to_owned());
+        return Err(MapError::NoKeyframe(reason));
+    }
+    let states = keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
+    let pixels = sensor.camera.width * sensor.camera.height;
+    Ok(BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(pixels), keyframes, states))
+}
+
+/// Reads a frame.
+pub(super) fn observation(
+    dataset: &Dataset,
+    sensor: &Sensor,
+    index: usize,
+) -> Result<ObservationPyramid, String> {
+    let frame = dataset.frame(index).map_err(|error| error.to_string())?;
+    ObservationPyramid::new(sensor, &frame, LEVELS).ok_or_else(|| "its size is not the camera's".to_owned())
+}
+
+fn check_frames(dataset: &Dataset, run: &Run) -> Result<(), MapError> {
+    if run.exposures.len() != dataset.len() || run.frames.len() != dataset.len() {
+        return Err(MapError::Frames { run: run.exposures.len(), dataset: dataset.len() });
+    }
+    for (index, exposure) in run.exposures.iter().enumerate() {
+        let (run, dataset) = (exposure.timestamp, dataset.timestamp(index));
+        if (run - dataset).abs() > SAME_TIME {
+            return Err(MapError::Timestamp { index, run, dataset });
+        }
+    }
+    Ok(())
+}
+
+fn exposure_seconds(dataset: &Dataset) -> Vec<f64> {
+    (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect()
+}
+
+/// One sentence per kind of repair.
+fn repairs(repaired: &RepairedRun, when: &str) -> Vec<String> {
+    let kinds = [
+        (FrameVerdict::Reversed, "start and end exchanged"),
+        (FrameVerdict::Replaced, "replaced by the path of their neighbours"),
+        (FrameVerdict::Bridged, "lost and bridged"),
+    ];
+    let sentence = |(verdict, what): (FrameVerdict, &str)| {
+        let frames = repaired.continuity.frames_with(verdict);
+        (!frames.is_empty()).then(|| format!("{when} refinement, exposures {what}: frames {frames:?}"))
+    };
+    kinds.into_iter().filter_map(sentence).collect()
+}

@@ -1,0 +1,69 @@
+//! What can be chosen about a map.
+
+use std::time::Duration;
+
+use serde::Serialize;
+
+use crate::bundle::BundleSettings;
+
+/// Settings of [`map_dataset`](super::map_dataset).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapSettings {
+    /// Whether motion during the exposure is modelled.
+    pub blur: bool,
+    /// Upper bound of virtual views per exposure; `None` for the schedule's own.
+    pub virtual_views: Option<usize>,
+    /// Most keyframes; further frames are fitted to the finished map. At least 1.
+    pub max_keyframes: usize,
+    /// Most Gaussians; `None` for one that fits the image size.
+    pub max_gaussians: Option<usize>,
+    /// Time for all of it; `None` for as many steps as the schedule has, and equal results on all machines of a kind.
+    pub time_budget: Option<Duration>,
+    /// Seed of the order in which keyframes are visited.
+    pub seed: u64,
+}
+
+impl Default for MapSettings {
+    fn default() -> Self {
+        Self {
+            blur: true,
+            virtual_views: None,
+            max_keyframes: 100,
+            max_gaussians: None,
+            time_budget: None,
+            seed: 1,
+        }
+    }
+}
+
+/// Image pixels per Gaussian: what a camera sees is described by a third as many Gaussians as it has pixels.
+const PIXELS_PER_GAUSSIAN: usize = 3;
+
+/// The settings that change the result, for the identity of a checkpoint.
+#[derive(Serialize)]
+pub(super) struct Decisive {
+    bundle: BundleSettings,
+    max_keyframes: usize,
+    timed: bool,
+}
+
+impl MapSettings {
+    /// Those of the bundle adjustment, for images of that many pixels.
+    pub(super) fn bundle(&self, pixels: usize) -> BundleSettings {
+        let by_size = (pixels / PIXELS_PER_GAUSSIAN).max(2000);
+        BundleSettings {
+            blur: self.blur,
+            max_views: self.virtual_views.unwrap_or(usize::MAX),
+            max_gaussians: self.max_gaussians.unwrap_or(by_size),
+            seed: self.seed,
+        }
+    }
+
+    pub(super) fn decisive(&self, pixels: usize) -> Decisive {
+        Decisive {
+            bundle: self.bundle(pixels),
+            max_keyframes: self.max_keyframes,
+            timed: self.time_budget.is_some(),
+        }
+    }
+}

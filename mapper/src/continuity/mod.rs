@@ -19,6 +19,7 @@ mod problem;
 mod repair;
 mod run_data;
 mod scales;
+mod screening;
 mod settings;
 mod spline;
 

@@ -35,7 +35,7 @@ pub struct ContinuitySettings {
     pub swap_evidence: f64,
     /// Longest time between usable frames that is bridged, in median frame intervals; at least 1.
     pub longest_gap: f64,
-    /// Largest number of solutions, each linearised at the one before it and with the judgement that follows from
+    /// Largest number of solutions, each linearised at the one before it and with the directions that follow from
     /// it; 1 to 50.
     pub rounds: usize,
 }
@@ -43,8 +43,8 @@ pub struct ContinuitySettings {
 impl Default for ContinuitySettings {
     fn default() -> Self {
         Self {
-            translation: MotionLimits { acceleration: 60.0, jerk: 6_000.0 },
-            rotation: MotionLimits { acceleration: 300.0, jerk: 30_000.0 },
+            translation: MotionLimits { acceleration: 500.0, jerk: 100_000.0 },
+            rotation: MotionLimits { acceleration: 1_500.0, jerk: 300_000.0 },
             control_points_per_frame: 2.0,
             huber: 3.0,
             jerk_tolerance: 2.0,

@@ -288,3 +288,61 @@ fn solver_settings() -> Result<DefaultSettings<f64>, String> {
         .build()
         .map_err(|error| error.to_string())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::spline::Knots;
+    use super::*;
+
+    /// A resting path of one second that is observed twenty times at `height(time)` with unit noise.
+    fn observed(height: impl Fn(f64) -> f64) -> Problem {
+        let knots = Knots::over([0.0, 1.0], 0.1);
+        let observation = |k: usize| {
+            let times = [0.05 * k as f64, 0.05 * k as f64 + 0.02];
+            Observation {
+                supports: times.map(|time| knots.support(time)),
+                residuals: times.map(|time| Vector3::new(height(time), 0.0, 0.0)),
+                sigma: 1.0,
+            }
+        };
+        Problem {
+            observations: (0..20).map(observation).collect(),
+            steps: vec![Vector3::zeros(); knots.count - 1],
+            bending: vec![0.5; knots.count - 3],
+            max_second: 1e3,
+            max_third: 1e3,
+            huber: 2.0,
+        }
+    }
+
+    #[test]
+    fn an_outlier_pulls_no_more_for_being_further_away() {
+        let heights = [100.0, 1_000.0].map(|outlier| {
+            observed(|time| if (0.49..0.53).contains(&time) { outlier } else { 0.0 }).solve().unwrap()
+        });
+        let pulled = heights[0].iter().map(Vector3::norm).fold(0.0, f64::max);
+        assert!((0.01..3.0).contains(&pulled), "{pulled}");
+        for (near, far) in heights[0].iter().zip(&heights[1]) {
+            assert!((near - far).norm() < 1e-3, "{near} {far}");
+        }
+    }
+
+    #[test]
+    fn limits_hold_where_the_observations_break_them() {
+        // Second differences of 400 t² over steps of 0.1 are 8; the kink in the middle has large third differences.
+        let parabola = |time: f64| 400.0 * time * (time - 0.5).abs();
+        let free = observed(parabola);
+        let bound = Problem { max_second: 3.0, max_third: 2.0, ..free.clone() };
+        let largest = |problem: &Problem| {
+            let steps: Vec<_> = problem.solve().unwrap().windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let path = Problem { steps, ..problem.without_observations() };
+            [path.seconds(), path.thirds()]
+                .map(|differences| differences.iter().map(Vector3::norm).fold(0.0, f64::max))
+        };
+        let [second, third] = largest(&free);
+        assert!(second > 6.0 && third > 4.0, "{second} {third}");
+        let [second, third] = largest(&bound);
+        assert!(second < 3.0 * 1.002 && third < 2.0 * 1.002, "{second} {third}");
+        assert!(second > 2.9 || third > 1.9, "neither limit is reached: {second} {third}");
+    }
+}

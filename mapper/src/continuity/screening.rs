@@ -84,7 +84,7 @@ impl<'a> Screen<'a> {
         let candidates: Vec<usize> = [k].into_iter().chain(beside).collect();
         let disagreement = |&absent: &usize| {
             let others = candidates.iter().filter(|&&other| other != absent);
-            others.map(|&other| self.errors(other, Some(absent), false)).flatten().fold(0.0, f64::max)
+            others.flat_map(|&other| self.errors(other, Some(absent), false)).fold(0.0, f64::max)
         };
         let mut best = (k, disagreement(&k));
         for &candidate in &candidates[1..] {

@@ -27,8 +27,8 @@ pub struct ContinuitySettings {
     pub huber: f64,
     /// How much more than its typical jerk a sequence may show before bending costs, as a factor; positive.
     pub jerk_tolerance: f64,
-    /// Residual norm of a frame, in standard deviations, above which it is an outlier; positive. The deviations grow
-    /// to what is typical of the sequence, if that is more than its noise.
+    /// Distance of a frame's middle from what the frames around it predict, in expected errors, above which it is an
+    /// outlier; positive. Expected errors follow from noise and jerk, and grow to what is typical of the sequence.
     pub outlier: f64,
     /// Evidence (half the difference of squared residual norms) that a swap of start and end has to bring; not
     /// negative.

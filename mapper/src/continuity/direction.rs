@@ -13,9 +13,6 @@ use super::spline::Part;
 /// Cost at which a pair says nothing more: one of the two was aligned to the wrong place.
 const HIGHEST_PAIR_COST: f64 = 60.0;
 
-/// Exposures below this many seconds have no velocity.
-const INSTANT: f64 = 1e-6;
-
 /// Which of `measured` run against time as measured. A swap has to lower the cost by `evidence`.
 pub(super) fn reversed_exposures(measured: &[Measured], evidence: f64) -> Vec<bool> {
     let samples: Vec<Sample> = measured.iter().map(Measured::sample).collect();
@@ -55,25 +52,15 @@ fn pair_cost(pair: &[Measured], reversed: [bool; 2], usual_accelerations: [f64; 
     let cost = |part: Part, acceleration: f64| {
         let middle = part.step(&a.exposure.mid(), &b.exposure.mid()) / seconds;
         let excess = |frame: &Measured, reversed| {
-            velocity(frame, part, reversed).map_or_else(Vector3::zeros, |velocity| velocity - middle)
+            if frame.has_velocity() { frame.velocity(part, reversed) - middle } else { Vector3::zeros() }
         };
         let (at_a, at_b) = (excess(a, reversed[0]), excess(b, reversed[1]));
         // Integral of the squared acceleration of the cubic between them, divided by 4 over the time.
         let energy = at_a.norm_squared() + at_a.dot(&at_b) + at_b.norm_squared();
-        let noise = velocity_variance(a, part) + velocity_variance(b, part);
+        let noise = a.velocity_sigma(part).powi(2) + b.velocity_sigma(part).powi(2);
         energy / ((0.5 * acceleration * seconds).powi(2) + noise)
     };
     let [translation, rotation] = usual_accelerations;
     let cost = cost(Part::Translation, translation) + cost(Part::Rotation, rotation);
     (0.5 * cost).min(HIGHEST_PAIR_COST)
-}
-
-fn velocity(frame: &Measured, part: Part, reversed: bool) -> Option<Vector3<f64>> {
-    let path = part.step(&frame.exposure.start, &frame.exposure.end);
-    let sign = if reversed { -1.0 } else { 1.0 };
-    (frame.seconds() > INSTANT).then(|| path * (sign / frame.seconds()))
-}
-
-fn velocity_variance(frame: &Measured, part: Part) -> f64 {
-    (frame.noise_of(part) / frame.seconds().max(INSTANT)).powi(2)
 }

@@ -1,16 +1,18 @@
 //! The smooth path through a part of the sequence, and what it says about every exposure on it.
 
+use std::f64::consts::SQRT_2;
+
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::geometry::so3;
 use mba_tracker::trajectory::ExposureTrajectory;
 use nalgebra::Vector3;
 
 use super::ContinuitySettings;
-use super::direction::reversed_exposures;
 use super::frame::PoseNoise;
 use super::problem::{Observation, Problem};
 use super::scales::{Sample, typical_derivatives};
-use super::spline::{Knots, Part, Path};
+use super::screening::judge;
+use super::spline::{Knots, MEETING_POINTS, Part, Path, meeting_times};
 use crate::evaluation::quantile;
 
 /// Frames from which a path tells which of them is wrong.
@@ -19,12 +21,11 @@ pub(super) const FEWEST_FRAMES: usize = 5;
 /// Median length of a vector of six standard normal numbers.
 const MEDIAN_NORM_6: f64 = 2.313;
 
-/// Error of a prediction from both sides, and from one, in units of jerk × (frame interval)³.
-const BRIDGED_ERROR: f64 = 0.05;
-const CONTINUED_ERROR: f64 = 0.5;
+/// Exposures below this many seconds have no velocity.
+const INSTANT: f64 = 1e-6;
 
-/// Increments below this many metres or radians do not matter.
-const SETTLED: f64 = 1e-5;
+/// Rotation increments in radians below which the next ones would not matter: each is some percent of the one before.
+const SETTLED: f64 = 3e-3;
 
 /// A tracked frame of the part.
 #[derive(Clone, Copy, Debug)]
@@ -40,6 +41,21 @@ pub(super) struct Measured {
 impl Measured {
     pub(super) fn seconds(&self) -> f64 {
         self.shutter[1] - self.shutter[0]
+    }
+
+    pub(super) fn has_velocity(&self) -> bool {
+        self.seconds() > INSTANT
+    }
+
+    /// World vector per second over the exposure; [`Self::has_velocity`] tells whether there is one.
+    pub(super) fn velocity(&self, part: Part, reversed: bool) -> Vector3<f64> {
+        let sign = if reversed { -1.0 } else { 1.0 };
+        part.step(&self.exposure.start, &self.exposure.end) * (sign / self.seconds())
+    }
+
+    /// Standard deviation of the velocity along one axis.
+    pub(super) fn velocity_sigma(&self, part: Part) -> f64 {
+        SQRT_2 * self.noise_of(part) / self.seconds().max(INSTANT)
     }
 
     pub(super) fn noise_of(&self, part: Part) -> f64 {
@@ -82,19 +98,22 @@ pub(super) struct Fit {
     pub(super) bending: f64,
 }
 
-/// Fits a path to at least [`FEWEST_FRAMES`] frames of increasing time; `interval` is the usual time between frames.
+/// Fits a path to the frames in their place, of at least [`FEWEST_FRAMES`] frames of increasing time; `interval` is the
+/// usual time between frames.
 pub(super) fn fit(
     measured: &[Measured],
     interval: f64,
     settings: &ContinuitySettings,
 ) -> Result<Fit, String> {
     let mut state = State::new(measured, interval, settings);
-    for round in 0..settings.rounds {
-        let largest = state.solve()?;
-        let judgements = state.judge();
-        let settled = judgements == state.judgements && largest < SETTLED;
-        state.judgements = judgements;
-        if settled && round > 0 {
+    let mut largest_turn = state.solve()?;
+    for _ in 1..settings.rounds {
+        if state.review_directions() {
+            largest_turn = state.solve()?;
+        } else if largest_turn > SETTLED {
+            // Only rotations depend on where they were linearised.
+            largest_turn = state.solve_part(Part::Rotation)?;
+        } else {
             break;
         }
     }
@@ -112,23 +131,23 @@ struct State<'a> {
 
 impl<'a> State<'a> {
     fn new(measured: &'a [Measured], interval: f64, settings: &'a ContinuitySettings) -> Self {
-        let reversed = reversed_exposures(measured, settings.swap_evidence);
-        let judgements = reversed.into_iter().map(|reversed| Judgement { reversed, outlier: false });
+        let judgements = judge(measured, settings);
         let jerks = Part::BOTH.map(|part| usual_jerk(measured, part, interval, settings));
-        let path = first_path(measured, interval / settings.control_points_per_frame);
-        Self { measured, settings, path, judgements: judgements.collect(), jerks }
+        let path = first_path(measured, &judgements, interval / settings.control_points_per_frame);
+        Self { measured, settings, path, judgements, jerks }
     }
 
-    /// Solves for both halves of the poses and returns the largest increment.
+    /// Solves for both halves of the poses and returns the largest rotation increment.
     fn solve(&mut self) -> Result<f64, String> {
         let problems = Part::BOTH.map(|part| self.problem(part));
         let (translation, rotation) = rayon::join(|| problems[0].solve(), || problems[1].solve());
-        let mut largest = 0.0_f64;
-        for (part, increments) in [(Part::Translation, translation?), (Part::Rotation, rotation?)] {
-            largest = increments.iter().map(Vector3::norm).fold(largest, f64::max);
-            self.path.advance(part, &increments);
-        }
-        Ok(largest)
+        self.path.advance(Part::Translation, &translation?);
+        Ok(self.path.advance(Part::Rotation, &rotation?))
+    }
+
+    fn solve_part(&mut self, part: Part) -> Result<f64, String> {
+        let increments = self.problem(part).solve()?;
+        Ok(self.path.advance(part, &increments))
     }
 
     fn problem(&self, part: Part) -> Problem {
@@ -151,18 +170,18 @@ impl<'a> State<'a> {
         let agreeing = self.measured.iter().zip(&self.judgements).filter(|(_, judgement)| !judgement.outlier);
         agreeing
             .map(|(frame, judgement)| Observation {
-                supports: frame.shutter.map(|time| self.path.knots.support(time)),
+                supports: meeting_times(frame.shutter).map(|time| self.path.knots.support(time)),
                 residuals: self.residuals(frame, *judgement, part),
                 sigma: frame.noise_of(part),
             })
             .collect()
     }
 
-    /// From the path to the ends of an exposure.
+    /// From the path to an exposure at its two meeting points.
     fn residuals(&self, frame: &Measured, judgement: Judgement, part: Part) -> [Vector3<f64>; 2] {
-        let expected = self.path.exposure(frame.shutter);
         let found = judgement.directed(&frame.exposure);
-        [part.step(&expected.start, &found.start), part.step(&expected.end, &found.end)]
+        let times = meeting_times(frame.shutter);
+        [0, 1].map(|k| part.step(&self.path.at(times[k]), &found.at(MEETING_POINTS[k])))
     }
 
     /// Standard deviation of every third difference of control points.
@@ -179,63 +198,34 @@ impl<'a> State<'a> {
             .collect()
     }
 
-    /// Judges every frame by the current path.
-    fn judge(&self) -> Vec<Judgement> {
-        let tolerances = self.tolerances();
-        let norms = |k: usize, judgement: Judgement| {
-            Part::BOTH.map(|part| {
-                let tolerance = tolerances[part as usize][k];
-                norm(&self.residuals(&self.measured[k], judgement, part)) / tolerance
-            })
+    /// Turns the frames in their place that the current path shows the other way round; whether there are any.
+    fn review_directions(&mut self) -> bool {
+        let tolerances = Part::BOTH.map(|part| self.tolerance_factor(part));
+        let cost = |frame: &Measured, judgement: Judgement| -> f64 {
+            let squared = |part: Part| {
+                let tolerance = tolerances[part as usize] * frame.noise_of(part);
+                0.5 * (norm(&self.residuals(frame, judgement, part)) / tolerance).powi(2)
+            };
+            Part::BOTH.into_iter().map(squared).sum()
         };
-        (0..self.measured.len())
-            .map(|k| {
-                let here = Judgement { outlier: false, ..self.judgements[k] };
-                let other = Judgement { reversed: !here.reversed, outlier: false };
-                let [norms_here, norms_other] = [here, other].map(|judgement| norms(k, judgement));
-                let gain = 0.5 * (sum_of_squares(&norms_here) - sum_of_squares(&norms_other));
-                let swap = gain > self.settings.swap_evidence;
-                let (best, norms) = if swap { (other, norms_other) } else { (here, norms_here) };
-                Judgement { outlier: norms.iter().any(|&norm| norm > self.settings.outlier), ..best }
-            })
-            .collect()
+        let wrong = |(frame, here): (&Measured, &Judgement)| {
+            let other = Judgement { reversed: !here.reversed, ..*here };
+            !here.outlier && cost(frame, *here) - cost(frame, other) > self.settings.swap_evidence
+        };
+        let wrong: Vec<bool> = self.measured.iter().zip(&self.judgements).map(wrong).collect();
+        for (judgement, &wrong) in self.judgements.iter_mut().zip(&wrong) {
+            judgement.reversed ^= wrong;
+        }
+        wrong.contains(&true)
     }
 
-    /// Standard deviation of the residual of every frame: its noise and the error of predicting it, grown to what is
-    /// typical of the sequence.
-    fn tolerances(&self) -> [Vec<f64>; 2] {
-        Part::BOTH.map(|part| {
-            let mut tolerances: Vec<f64> =
-                (0..self.measured.len()).map(|k| self.expected_residual(k, part)).collect();
-            let norms: Vec<f64> = self
-                .measured
-                .iter()
-                .zip(&self.judgements)
-                .zip(&tolerances)
-                .map(|((frame, &judgement), tolerance)| {
-                    norm(&self.residuals(frame, judgement, part)) / tolerance
-                })
-                .collect();
-            let typical = quantile(&norms, 0.5).unwrap_or(0.0) / MEDIAN_NORM_6;
-            tolerances.iter_mut().for_each(|tolerance| *tolerance *= typical.max(1.0));
-            tolerances
-        })
-    }
-
-    fn expected_residual(&self, k: usize, part: Part) -> f64 {
-        let usable = |k: &usize| !self.judgements[*k].outlier;
-        let before =
-            (0..k).rev().find(usable).map(|l| self.measured[k].timestamp - self.measured[l].timestamp);
-        let after = (k + 1..self.measured.len())
-            .find(usable)
-            .map(|l| self.measured[l].timestamp - self.measured[k].timestamp);
-        let (seconds, error) = match (before, after) {
-            (Some(before), Some(after)) => (before.max(after), BRIDGED_ERROR),
-            (Some(one), None) | (None, Some(one)) => (one, CONTINUED_ERROR),
-            (None, None) => (0.0, 0.0),
-        };
-        let predicted = error * self.jerks[part as usize][k] * seconds.powi(3);
-        self.measured[k].noise_of(part).hypot(predicted)
+    /// How much larger the residuals are than their noise, at least 1.
+    fn tolerance_factor(&self, part: Part) -> f64 {
+        let frames = self.measured.iter().zip(&self.judgements);
+        let norms: Vec<f64> = frames
+            .map(|(frame, &judgement)| norm(&self.residuals(frame, judgement, part)) / frame.noise_of(part))
+            .collect();
+        (quantile(&norms, 0.5).unwrap_or(0.0) / MEDIAN_NORM_6).max(1.0)
     }
 
     fn into_fit(self) -> Fit {
@@ -259,16 +249,16 @@ impl<'a> State<'a> {
     fn bending_cost(&self, part: Part) -> f64 {
         let steps = self.path.steps(part);
         let thirds = steps.windows(3).map(|w| w[2] - w[1] * 2.0 + w[0]);
-        thirds.zip(self.bending_scales(part)).map(|(third, sigma)| 0.5 * (third / sigma).norm_squared()).sum()
+        let huber = self.settings.huber;
+        thirds
+            .zip(self.bending_scales(part))
+            .map(|(third, sigma)| huber_cost((third / sigma).norm(), huber))
+            .sum()
     }
 }
 
 fn norm(residuals: &[Vector3<f64>; 2]) -> f64 {
     residuals[0].norm().hypot(residuals[1].norm())
-}
-
-fn sum_of_squares(values: &[f64]) -> f64 {
-    values.iter().map(|value| value * value).sum()
 }
 
 fn huber_cost(norm: f64, width: f64) -> f64 {
@@ -285,24 +275,26 @@ fn usual_jerk(measured: &[Measured], part: Part, interval: f64, settings: &Conti
     typical.iter().map(|jerk| (settings.jerk_tolerance * jerk).max(floor)).collect()
 }
 
-/// Straight lines between the middles of the exposures.
-fn first_path(measured: &[Measured], step: f64) -> Path {
+/// Straight lines between the middles of the exposures in their place.
+fn first_path(measured: &[Measured], judgements: &[Judgement], step: f64) -> Path {
     let ends = measured.iter().flat_map(|frame| frame.shutter);
     let (start, end) =
         ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), time| (low.min(time), high.max(time)));
     let knots = Knots::over([start, end], step);
-    let controls = (0..knots.count).map(|k| between_middles(measured, knots.time(k))).collect();
+    let in_place = measured.iter().zip(judgements).filter(|(_, judgement)| !judgement.outlier);
+    let samples: Vec<Sample> = in_place.map(|(frame, _)| frame.sample()).collect();
+    let controls = (0..knots.count).map(|k| between(&samples, knots.time(k))).collect();
     Path { knots, controls }
 }
 
-fn between_middles(measured: &[Measured], time: f64) -> RigidTransform {
-    let after = measured.partition_point(|frame| frame.timestamp <= time).clamp(1, measured.len() - 1);
-    let [a, b] = [&measured[after - 1], &measured[after]];
+fn between(samples: &[Sample], time: f64) -> RigidTransform {
+    let after = samples.partition_point(|sample| sample.timestamp <= time).clamp(1, samples.len() - 1);
+    let [a, b] = [&samples[after - 1], &samples[after]];
     let share = ((time - a.timestamp) / (b.timestamp - a.timestamp)).clamp(0.0, 1.0);
-    let [from, to] = [a, b].map(|frame| frame.exposure.mid());
-    let turn = so3::exp(&(Part::Rotation.step(&from, &to) * share));
+    let [from, to] = [&a.world_from_camera, &b.world_from_camera];
+    let turn = so3::exp(&(Part::Rotation.step(from, to) * share));
     RigidTransform {
         rotation: so3::renormalised(&(turn * from.rotation)),
-        translation: from.translation + Part::Translation.step(&from, &to) * share,
+        translation: from.translation + Part::Translation.step(from, to) * share,
     }
 }

@@ -4,6 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::trajectory::ExposureTrajectory;
 
 use super::ContinuityError;
+use super::scales::Sample;
 
 /// How exactly the pose at either end of an exposure was measured: standard deviations along one axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +60,11 @@ pub struct ContinuityFrame {
 }
 
 impl ContinuityFrame {
+    /// The pose at mid exposure with its time.
+    pub(super) fn sample(&self) -> Sample {
+        Sample { timestamp: self.timestamp, world_from_camera: self.world_from_camera.mid() }
+    }
+
     /// Times of shutter opening and closing, seconds.
     pub(super) fn shutter(&self) -> [f64; 2] {
         let half = 0.5 * self.exposure_seconds;

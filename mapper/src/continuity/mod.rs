@@ -4,7 +4,9 @@
 //! to the wrong place or not at all. Between frames a camera cannot jump, so a smooth path through the exposures tells
 //! which of them are wrong and what belongs in their place. The path is a uniform cubic B-spline of about two control
 //! points per frame; its increments solve a second-order cone program (clarabel) with a Huber norm per frame, a bending
-//! term whose strength follows from the sequence itself, and physical limits of acceleration and jerk.
+//! term whose strength follows from the sequence itself, and physical limits of acceleration and jerk. Before that,
+//! positions and velocities around each frame tell which ones are misplaced: a path so flexible could follow them as it
+//! has to follow a jolt of the hand.
 //!
 //! [`repair`] corrects swaps, outliers and lost frames and leaves every other frame as it was measured, bit for bit.
 //! [`repair_run`] is the same for the data of a RUN folder. [`predict_motions`] gives bundle adjustment the motion during
@@ -19,6 +21,7 @@ mod problem;
 mod repair;
 mod run_data;
 mod scales;
+mod screening;
 mod settings;
 mod spline;
 

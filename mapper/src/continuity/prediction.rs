@@ -4,7 +4,8 @@ use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Vector3, Vector6};
 
 use super::repair::usual_interval;
-use super::scales::MEDIAN_NORM_3;
+use super::scales::{MEDIAN_NORM_3, Sample, derivative};
+use super::spline::Part;
 use super::{ContinuityFrame, ContinuitySettings};
 use crate::evaluation::quantile;
 
@@ -27,8 +28,8 @@ pub struct MotionPrediction {
 /// and where one neighbour is lost or further away than the settings bridge.
 ///
 /// The velocity is the derivative of a polynomial through the tracked frames k-2 to k+2 (k-1 to k+1 where fewer are
-/// there), so it does not depend on any measured motion and its direction of time is right. The uncertainty is the usual
-/// misfit to the measured motions, the same velocity error for every frame, at least `1e-4` m and rad over an exposure.
+/// there), so it does not depend on any measured motion and its direction of time is right. The uncertainty is
+/// calibrated by the misfit to the measured motions and grows with the jerk around the frame, at least `1e-4` m and rad over an exposure.
 /// Run this after [`repair`](super::repair).
 #[must_use]
 pub fn predict_motions(
@@ -40,15 +41,13 @@ pub fn predict_motions(
     let velocities: Vec<Option<Vector6<f64>>> =
         (0..frames.len()).map(|k| velocity(frames, k, longest_gap)).collect();
     let sigmas = velocity_sigmas(frames, &velocities);
-    frames
-        .iter()
-        .zip(velocities)
-        .map(|(frame, velocity)| {
-            let seconds = frame.exposure_seconds;
-            velocity.map(|velocity| MotionPrediction {
+    (0..frames.len())
+        .map(|k| {
+            let seconds = frames[k].exposure_seconds;
+            velocities[k].map(|velocity| MotionPrediction {
                 motion: velocity * seconds,
-                translation_sigma: (sigmas[0] * seconds).max(LEAST_SIGMA),
-                rotation_sigma: (sigmas[1] * seconds).max(LEAST_SIGMA),
+                translation_sigma: (sigmas[0][k] * seconds).max(LEAST_SIGMA),
+                rotation_sigma: (sigmas[1][k] * seconds).max(LEAST_SIGMA),
             })
         })
         .collect()
@@ -85,19 +84,40 @@ fn derivative_at_zero(mid: &RigidTransform, others: &[(f64, RigidTransform)]) ->
     sum
 }
 
-/// Usual difference between measured and predicted velocity along one axis, m/s and rad/s.
-fn velocity_sigmas(frames: &[ContinuityFrame], velocities: &[Option<Vector6<f64>>]) -> [f64; 2] {
-    let misfits: Vec<Vector6<f64>> = frames
-        .iter()
-        .zip(velocities)
-        .filter(|(frame, _)| frame.exposure_seconds > 0.0)
-        .filter_map(|(frame, velocity)| {
-            velocity.map(|velocity| frame.world_from_camera.motion() / frame.exposure_seconds - velocity)
-        })
-        .collect();
-    [0, 3].map(|first| {
-        let norm = |misfit: &Vector6<f64>| Vector3::from(misfit.fixed_rows::<3>(first)).norm();
-        let norms: Vec<f64> = misfits.iter().map(norm).collect();
-        quantile(&norms, 0.5).unwrap_or(0.0) / MEDIAN_NORM_3
+/// Standard deviation of every predicted velocity along one axis, m/s and rad/s: the jerk around the frame, scaled so
+/// that the measured velocities fit.
+fn velocity_sigmas(frames: &[ContinuityFrame], velocities: &[Option<Vector6<f64>>]) -> [Vec<f64>; 2] {
+    let tracked: Vec<usize> = (0..frames.len()).filter(|&k| frames[k].noise.is_some()).collect();
+    let samples: Vec<Sample> = tracked.iter().map(|&k| frames[k].sample()).collect();
+    Part::BOTH.map(|part| {
+        let mut jerks = vec![0.0; frames.len()];
+        for (jerk, &k) in largest_jerks(&samples, part).iter().zip(&tracked) {
+            jerks[k] = *jerk;
+        }
+        let misfit = |k: usize| {
+            let frame = &frames[k];
+            let measured = (frame.exposure_seconds > 0.0)
+                .then(|| frame.world_from_camera.motion() / frame.exposure_seconds)?;
+            let difference = measured - velocities[k]?;
+            let of_part = Vector3::from(difference.fixed_rows::<3>(3 * part as usize));
+            (jerks[k] > 0.0).then(|| of_part.norm() / jerks[k])
+        };
+        let misfits: Vec<f64> = (0..frames.len()).filter_map(misfit).collect();
+        let scale = quantile(&misfits, 0.5).unwrap_or(0.0) / MEDIAN_NORM_3;
+        jerks.iter().map(|jerk| jerk * scale).collect()
     })
+}
+
+/// Largest jerk of the four-frame windows that each sample lies in, at least the usual one.
+fn largest_jerks(samples: &[Sample], part: Part) -> Vec<f64> {
+    const WINDOW: usize = 4;
+    let jerks: Vec<f64> = samples.windows(WINDOW).map(|window| derivative(window, part).norm()).collect();
+    let usual = quantile(&jerks, 0.5).unwrap_or(0.0);
+    (0..samples.len())
+        .map(|k| {
+            let end = (k + 1).min(jerks.len());
+            let around = &jerks[(k + 1).saturating_sub(WINDOW).min(end)..end];
+            around.iter().copied().fold(usual, f64::max)
+        })
+        .collect()
 }

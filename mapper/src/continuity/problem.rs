@@ -1,12 +1,13 @@
 //! The second-order cone program of one half of the poses, translation or rotation.
 //!
 //! Unknown are the increments φ of the control points, the same program for both halves since rotations are linearised
-//! at the current path. With residuals z of the two ends of frame i, weights β, standard deviations σ and differences D
+//! at the current path. With residuals z of two instants of frame i, weights β, standard deviations σ and differences D
 //! of the current control points:
 //!
 //! ```text
-//! minimise    Σ_i ½ s_i² + h t_i  +  ½ Σ_k ‖(D³_k + Δ³φ_k) / j_k‖²
-//! subject to  ‖((z_start - Σ β φ) / σ_i, (z_end - Σ β φ) / σ_i)‖ ≤ s_i + t_i,   t_i ≥ 0      (Huber of width h)
+//! minimise    Σ_i ½ s_i² + h t_i  +  Σ_k ½ s_k² + h t_k
+//! subject to  ‖((z_1 - Σ β φ) / σ_i, (z_2 - Σ β φ) / σ_i)‖ ≤ s_i + t_i,   t_i ≥ 0      (Huber of width h)
+//!             ‖(D³_k + Δ³φ_k) / j_k‖ ≤ s_k + t_k,   t_k ≥ 0                            (jolts are rare, but real)
 //!             ‖D²_k + Δ²φ_k‖ ≤ a_max step²,   ‖D³_k + Δ³φ_k‖ ≤ j_max step³
 //! ```
 //!
@@ -93,14 +94,19 @@ impl Problem {
 
     fn program(&self, limits: &Limits, unit: f64) -> Program {
         let controls = self.controls();
-        let mut program = Program::new(3 * controls + 2 * self.observations.len());
-        for (k, (third, sigma)) in self.thirds().iter().zip(&self.bending).enumerate() {
-            program.add_square(k, &THIRD_DIFFERENCE.map(|c| c * unit / sigma), &(third / *sigma));
+        let mut program =
+            Program::new(3 * controls, self.observations.len() + self.bending.len(), self.huber);
+        for observation in &self.observations {
+            program.add_huber(|rows| {
+                for (support, residual) in observation.supports.iter().zip(&observation.residuals) {
+                    let weights = support.weights.map(|weight| weight * unit / observation.sigma);
+                    rows.add(support.first, &weights, &(residual / observation.sigma));
+                }
+            });
         }
-        let nonnegative = 3 * controls + 1;
-        program.add_nonnegative((0..self.observations.len()).map(|i| nonnegative + 2 * i));
-        for (i, observation) in self.observations.iter().enumerate() {
-            program.add_huber(nonnegative - 1 + 2 * i, self.huber, observation, unit);
+        for (k, (third, sigma)) in self.thirds().iter().zip(&self.bending).enumerate() {
+            let weights = THIRD_DIFFERENCE.map(|c| -c * unit / sigma);
+            program.add_huber(|rows| rows.add(k, &weights, &(third / *sigma)));
         }
         for (chosen, current, stencil, limit) in [
             (&limits.second, self.seconds(), &SECOND_DIFFERENCE[..], self.max_second),
@@ -173,90 +179,92 @@ impl Triplets {
     }
 }
 
-/// minimise ½ xᵀPx + qᵀx subject to Ax + s = b, s in cones. The first unknowns are the control points, axis by axis.
+/// Rows of Ax + s = b.
+#[derive(Default)]
+struct Rows {
+    matrix: Triplets,
+    bounds: Vec<f64>,
+}
+
+impl Rows {
+    /// Three rows whose slack is `offset` - Σ weights · φ over the control points from `first`.
+    fn add(&mut self, first: usize, weights: &[f64], offset: &Vector3<f64>) {
+        for axis in 0..3 {
+            for (k, &weight) in weights.iter().enumerate() {
+                self.matrix.push(self.bounds.len(), 3 * (first + k) + axis, weight);
+            }
+            self.bounds.push(offset[axis]);
+        }
+    }
+
+    /// One row whose slack is `bound` plus the sum of some unknowns.
+    fn add_sum(&mut self, bound: f64, unknowns: &[usize]) {
+        for &unknown in unknowns {
+            self.matrix.push(self.bounds.len(), unknown, -1.0);
+        }
+        self.bounds.push(bound);
+    }
+}
+
+/// minimise ½ xᵀPx + qᵀx subject to Ax + s = b, s in cones. The unknowns are the control points, axis by axis, then s
+/// and t of every Huber norm side by side.
 struct Program {
     quadratic: Triplets,
     linear: Vec<f64>,
-    constraints: Triplets,
-    bounds: Vec<f64>,
+    rows: Rows,
     cones: Vec<SupportedConeT<f64>>,
+    /// First unknown of the next Huber norm.
+    next: usize,
 }
 
 impl Program {
-    fn new(unknowns: usize) -> Self {
-        Self {
+    fn new(controls: usize, norms: usize, huber: f64) -> Self {
+        let mut program = Self {
             quadratic: Triplets::default(),
-            linear: vec![0.0; unknowns],
-            constraints: Triplets::default(),
-            bounds: Vec::new(),
-            cones: Vec::new(),
+            linear: vec![0.0; controls],
+            rows: Rows::default(),
+            cones: vec![SupportedConeT::NonnegativeConeT(norms)],
+            next: controls,
+        };
+        for s in (0..norms).map(|k| controls + 2 * k) {
+            program.quadratic.push(s, s, 1.0);
+            program.linear.extend([0.0, huber]);
+            program.rows.add_sum(0.0, &[s + 1]);
         }
+        program
     }
 
-    /// Adds ½‖offset + Σ stencil · φ‖² over the control points from `first`.
-    fn add_square(&mut self, first: usize, stencil: &[f64; 4], offset: &Vector3<f64>) {
-        for axis in 0..3 {
-            for (a, &of_a) in stencil.iter().enumerate() {
-                self.linear[3 * (first + a) + axis] += of_a * offset[axis];
-                for (b, &of_b) in stencil.iter().enumerate().skip(a) {
-                    self.quadratic.push(3 * (first + a) + axis, 3 * (first + b) + axis, of_a * of_b);
-                }
-            }
-        }
-    }
-
-    fn add_nonnegative(&mut self, unknowns: impl Iterator<Item = usize>) {
-        let first = self.bounds.len();
-        for unknown in unknowns {
-            self.constraints.push(self.bounds.len(), unknown, -1.0);
-            self.bounds.push(0.0);
-        }
-        self.cones.push(SupportedConeT::NonnegativeConeT(self.bounds.len() - first));
-    }
-
-    /// Adds ½s² + h t and the cone of an observation; unknowns s and t stand side by side.
-    fn add_huber(&mut self, s: usize, huber: f64, observation: &Observation, unit: f64) {
-        self.quadratic.push(s, s, 1.0);
-        self.linear[s + 1] = huber;
-        let bound = self.bounds.len();
-        self.constraints.push(bound, s, -1.0);
-        self.constraints.push(bound, s + 1, -1.0);
-        self.bounds.push(0.0);
-        for (support, residual) in observation.supports.iter().zip(&observation.residuals) {
-            let weights = support.weights.map(|weight| weight * unit / observation.sigma);
-            self.add_rows(support.first, &weights, &(residual / observation.sigma));
-        }
-        self.cones.push(SupportedConeT::SecondOrderConeT(7));
+    /// Adds the Huber norm of some rows.
+    fn add_huber(&mut self, add_rows: impl FnOnce(&mut Rows)) {
+        let unknowns = [self.next, self.next + 1];
+        self.next += 2;
+        self.add_cone(0.0, &unknowns, add_rows);
     }
 
     /// Bounds ‖offset + scale Σ stencil · φ‖ by 1.
     fn add_limit(&mut self, first: usize, stencil: &[f64], scale: f64, offset: &Vector3<f64>) {
-        self.bounds.push(1.0);
         let weights: Vec<f64> = stencil.iter().map(|c| -c * scale).collect();
-        self.add_rows(first, &weights, offset);
-        self.cones.push(SupportedConeT::SecondOrderConeT(4));
+        self.add_cone(1.0, &[], |rows| rows.add(first, &weights, offset));
     }
 
-    /// Three rows whose slack is `offset` - Σ weights · φ.
-    fn add_rows(&mut self, first: usize, weights: &[f64], offset: &Vector3<f64>) {
-        for axis in 0..3 {
-            for (k, &weight) in weights.iter().enumerate() {
-                self.constraints.push(self.bounds.len(), 3 * (first + k) + axis, weight);
-            }
-            self.bounds.push(offset[axis]);
-        }
+    /// Bounds the norm of some rows by `bound` plus the sum of some unknowns.
+    fn add_cone(&mut self, bound: f64, unknowns: &[usize], add_rows: impl FnOnce(&mut Rows)) {
+        let first = self.rows.bounds.len();
+        self.rows.add_sum(bound, unknowns);
+        add_rows(&mut self.rows);
+        self.cones.push(SupportedConeT::SecondOrderConeT(self.rows.bounds.len() - first));
     }
 
     /// The first `wanted` unknowns.
     fn solve(self, wanted: usize) -> Result<Vec<f64>, String> {
         let unknowns = self.linear.len();
         let quadratic = self.quadratic.into_matrix(unknowns, unknowns);
-        let constraints = self.constraints.into_matrix(self.bounds.len(), unknowns);
+        let constraints = self.rows.matrix.into_matrix(self.rows.bounds.len(), unknowns);
         let mut solver = DefaultSolver::new(
             &quadratic,
             &self.linear,
             &constraints,
-            &self.bounds,
+            &self.rows.bounds,
             &self.cones,
             solver_settings()?,
         )
@@ -279,4 +287,62 @@ fn solver_settings() -> Result<DefaultSettings<f64>, String> {
         .tol_feas(1e-7)
         .build()
         .map_err(|error| error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::spline::Knots;
+    use super::*;
+
+    /// A resting path of one second that is observed twenty times at `height(time)` with unit noise.
+    fn observed(height: impl Fn(f64) -> f64) -> Problem {
+        let knots = Knots::over([0.0, 1.0], 0.1);
+        let observation = |k: usize| {
+            let times = [0.05 * k as f64, 0.05 * k as f64 + 0.02];
+            Observation {
+                supports: times.map(|time| knots.support(time)),
+                residuals: times.map(|time| Vector3::new(height(time), 0.0, 0.0)),
+                sigma: 1.0,
+            }
+        };
+        Problem {
+            observations: (0..20).map(observation).collect(),
+            steps: vec![Vector3::zeros(); knots.count - 1],
+            bending: vec![0.5; knots.count - 3],
+            max_second: 1e3,
+            max_third: 1e3,
+            huber: 2.0,
+        }
+    }
+
+    #[test]
+    fn an_outlier_pulls_no_more_for_being_further_away() {
+        let heights = [100.0, 1_000.0].map(|outlier| {
+            observed(|time| if (0.49..0.53).contains(&time) { outlier } else { 0.0 }).solve().unwrap()
+        });
+        let pulled = heights[0].iter().map(Vector3::norm).fold(0.0, f64::max);
+        assert!((0.01..3.0).contains(&pulled), "{pulled}");
+        for (near, far) in heights[0].iter().zip(&heights[1]) {
+            assert!((near - far).norm() < 1e-3, "{near} {far}");
+        }
+    }
+
+    #[test]
+    fn limits_hold_where_the_observations_break_them() {
+        // Second differences of 400 t² over steps of 0.1 are 8; the kink in the middle has large third differences.
+        let parabola = |time: f64| 400.0 * time * (time - 0.5).abs();
+        let free = observed(parabola);
+        let bound = Problem { max_second: 3.0, max_third: 2.0, ..free.clone() };
+        let largest = |problem: &Problem| {
+            let steps: Vec<_> = problem.solve().unwrap().windows(2).map(|pair| pair[1] - pair[0]).collect();
+            let path = Problem { steps, ..problem.without_observations() };
+            [path.seconds(), path.thirds()]
+                .map(|differences| differences.iter().map(Vector3::norm).fold(0.0, f64::max))
+        };
+        let [second, third] = largest(&free);
+        assert!(second > 6.0 && third > 4.0, "{second} {third}");
+        let [second, third] = largest(&bound);
+        assert!(second < 3.0 * 1.002 && third < 2.0 * 1.002, "{second} {third}");
+        assert!(second > 2.9 || third > 1.9, "neither limit is reached: {second} {third}");
+    }
 }

@@ -12,6 +12,9 @@ pub(super) const MEDIAN_NORM_3: f64 = 1.538;
 /// Frames to either side whose motion is typical of a frame's. A hand is calm for a second and shakes in the next.
 const WINDOW: usize = 8;
 
+/// How much more than in the whole sequence may be typical of a place.
+const LARGEST_RISE: f64 = 3.0;
+
 /// A pose at mid exposure.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
@@ -30,14 +33,14 @@ pub(super) fn typical_derivatives(samples: &[Sample], part: Part, order: usize) 
         .map(|k| {
             let first = k.saturating_sub(WINDOW + order).min(lengths.len());
             let end = (k + WINDOW + 1).min(lengths.len());
-            median(&lengths[first..end.max(first)]).max(overall) / MEDIAN_NORM_3
+            median(&lengths[first..end.max(first)]).clamp(overall, LARGEST_RISE * overall) / MEDIAN_NORM_3
         })
         .collect()
 }
 
 /// The highest derivative that the samples determine: their divided difference times a factorial. Rotations are told
 /// from the first sample's.
-fn derivative(samples: &[Sample], part: Part) -> Vector3<f64> {
+pub(super) fn derivative(samples: &[Sample], part: Part) -> Vector3<f64> {
     let origin = &samples[0].world_from_camera;
     let mut sum = Vector3::zeros();
     for (k, sample) in samples.iter().enumerate().skip(1) {

@@ -27,15 +27,15 @@ pub struct ContinuitySettings {
     pub huber: f64,
     /// How much more than its typical jerk a sequence may show before bending costs, as a factor; positive.
     pub jerk_tolerance: f64,
-    /// Residual norm of a frame, in standard deviations, above which it is an outlier; positive. The deviations grow
-    /// to what is typical of the sequence, if that is more than its noise.
+    /// Distance of a frame's middle from what the frames around it predict, in expected errors, above which it is an
+    /// outlier; positive. Expected errors follow from noise and jerk, and grow to what is typical of the sequence.
     pub outlier: f64,
     /// Evidence (half the difference of squared residual norms) that a swap of start and end has to bring; not
     /// negative.
     pub swap_evidence: f64,
     /// Longest time between usable frames that is bridged, in median frame intervals; at least 1.
     pub longest_gap: f64,
-    /// Largest number of solutions, each linearised at the one before it and with the judgement that follows from
+    /// Largest number of solutions, each linearised at the one before it and with the directions that follow from
     /// it; 1 to 50.
     pub rounds: usize,
 }
@@ -43,8 +43,8 @@ pub struct ContinuitySettings {
 impl Default for ContinuitySettings {
     fn default() -> Self {
         Self {
-            translation: MotionLimits { acceleration: 60.0, jerk: 6_000.0 },
-            rotation: MotionLimits { acceleration: 300.0, jerk: 30_000.0 },
+            translation: MotionLimits { acceleration: 500.0, jerk: 100_000.0 },
+            rotation: MotionLimits { acceleration: 1_500.0, jerk: 300_000.0 },
             control_points_per_frame: 2.0,
             huber: 3.0,
             jerk_tolerance: 2.0,

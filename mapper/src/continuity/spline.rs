@@ -4,6 +4,15 @@ use mba_tracker::geometry::{RigidTransform, so3};
 use mba_tracker::trajectory::ExposureTrajectory;
 use nalgebra::{UnitQuaternion, Vector3};
 
+/// Where in the exposure the straight line fitted to a parabola meets it (Gauss points): a blurred image shows the
+/// straight motion, which misses the ends of a curved one.
+pub(super) const MEETING_POINTS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+/// The times of the meeting points between opening and closing.
+pub(super) fn meeting_times([opening, closing]: [f64; 2]) -> [f64; 2] {
+    MEETING_POINTS.map(|s| opening + s * (closing - opening))
+}
+
 /// Control points at equal steps of time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Knots {
@@ -73,9 +82,13 @@ impl Path {
         }
     }
 
-    /// The poses at the ends of an exposure.
-    pub(super) fn exposure(&self, [opening, closing]: [f64; 2]) -> ExposureTrajectory {
-        ExposureTrajectory { start: self.at(opening), end: self.at(closing) }
+    /// The straight exposure that the path looks like between the times of opening and closing.
+    pub(super) fn exposure(&self, shutter: [f64; 2]) -> ExposureTrajectory {
+        let [start, end] = meeting_times(shutter).map(|time| self.at(time));
+        let meeting = ExposureTrajectory { start, end };
+        let [first, last] = MEETING_POINTS;
+        let stretched = |s: f64| meeting.at((s - first) / (last - first));
+        ExposureTrajectory { start: stretched(0.0), end: stretched(1.0) }
     }
 
     /// Steps from each control point to the next as world vectors.
@@ -83,8 +96,8 @@ impl Path {
         self.controls.windows(2).map(|pair| part.step(&pair[0], &pair[1])).collect()
     }
 
-    /// Moves every control point by its increment, a world vector.
-    pub(super) fn advance(&mut self, part: Part, increments: &[Vector3<f64>]) {
+    /// Moves every control point by its increment, a world vector, and returns the length of the largest.
+    pub(super) fn advance(&mut self, part: Part, increments: &[Vector3<f64>]) -> f64 {
         for (control, increment) in self.controls.iter_mut().zip(increments) {
             match part {
                 Part::Translation => control.translation += increment,
@@ -93,6 +106,7 @@ impl Path {
                 }
             }
         }
+        increments.iter().map(Vector3::norm).fold(0.0, f64::max)
     }
 }
 

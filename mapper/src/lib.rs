@@ -12,6 +12,7 @@ pub mod gaussians;
 pub mod image_folders;
 pub mod infill;
 pub mod losses;
+pub mod mapping;
 mod png;
 pub mod raster;
 pub mod rendering;

@@ -7,9 +7,13 @@ use nalgebra::SVector;
 use rayon::prelude::*;
 
 use super::path::{ExposurePath, PATH_PARAMETERS};
-use super::scratch::{ExposureScratch, VirtualView};
+use super::scratch::{ExposureScratch, VirtualPose};
 use crate::gaussians::Gaussians;
-use crate::raster::{GaussianGradients, RasterImage, RasterView, Rasterizer};
+use crate::raster::pose::ViewGradient;
+use crate::raster::{GaussianGradients, RasterImage, RasterScratch, RasterView, Rasterizer, ViewShare};
+
+/// Gaussians per piece of work that looks for what is drawn.
+const GAUSSIANS_PER_PIECE: usize = 4096;
 
 /// Renders virtual views along an exposure, averages them in linear light, and takes gradients back.
 #[derive(Clone, Copy, Debug)]
@@ -41,21 +45,22 @@ impl ExposureRenderer {
         image: &mut RasterImage,
     ) {
         let views = views | 1;
-        scratch.reset(views);
-        scratch.used_mut().par_iter_mut().enumerate().for_each(|(k, view)| {
-            let time = SampleRule::Midpoint.time(k, views);
-            view.world_from_camera = path.at(time);
-            view.by_path = path.pose_jacobian(time);
-            let raster_view =
-                RasterView { camera: *camera, world_from_camera: view.world_from_camera, background };
-            self.rasterizer.forward(gaussians, &raster_view, &mut view.raster, &mut view.image);
-        });
-        scratch.drawn.clear();
-        scratch.drawn.resize(gaussians.len(), false);
-        for view in &scratch.views[..views] {
-            scratch.drawn.iter_mut().enumerate().for_each(|(k, drawn)| *drawn |= view.raster.is_drawn(k));
+        let ExposureScratch { rasters, poses, drawn, .. } = scratch;
+        poses.clear();
+        poses.extend((0..views).map(|k| VirtualPose::new(path, SampleRule::Midpoint.time(k, views))));
+        if rasters.len() < views {
+            rasters.resize_with(views, RasterScratch::default);
         }
-        store_mean(scratch.used_mut(), image);
+        let rasters = &mut rasters[..views];
+        rasters.par_iter_mut().zip(&*poses).enumerate().for_each(|(k, (raster, pose))| {
+            let view = RasterView { camera: *camera, world_from_camera: pose.world_from_camera, background };
+            self.rasterizer.render(gaussians, &view, k == views / 2, raster);
+        });
+        self.rasterizer.store_mean(rasters, image);
+        drawn.resize(gaussians.len(), false);
+        drawn.par_iter_mut().with_min_len(GAUSSIANS_PER_PIECE).enumerate().for_each(|(k, drawn)| {
+            *drawn = rasters.iter().any(|raster| raster.is_drawn(k));
+        });
     }
 
     /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
@@ -73,30 +78,29 @@ impl ExposureRenderer {
         scratch: &mut ExposureScratch,
         gradients: &mut GaussianGradients,
     ) -> SVector<f64, PATH_PARAMETERS> {
-        let mut by_path = SVector::<f64, PATH_PARAMETERS>::zeros();
-        let views = scratch.used;
-        let mut by_view = by_image.clone();
-        by_view.colour.iter_mut().flatten().for_each(|value| *value /= views as f32);
-        let mut geometry = [core::mem::take(&mut by_view.depth), core::mem::take(&mut by_view.alpha)];
-        for (k, view) in scratch.used_mut().iter_mut().enumerate() {
-            let is_mid = k == views / 2;
-            let zeros = || vec![0.0; by_image.depth.len()];
-            [by_view.depth, by_view.alpha] =
-                if is_mid { core::mem::take(&mut geometry) } else { [zeros(), zeros()] };
-            let by_pose = self.rasterizer.backward(gaussians, &by_view, &mut view.raster, gradients);
-            by_path += view.by_path.transpose() * by_pose.tangent(&view.world_from_camera);
+        let ExposureScratch { rasters, poses, pose_sums, .. } = scratch;
+        let views = poses.len();
+        let rasters = &mut rasters[..views];
+        if views == 0 || !rasters.iter().all(|raster| raster.fits(gaussians, by_image, gradients)) {
+            return SVector::zeros();
         }
-        by_path
+        rasters.par_iter_mut().enumerate().for_each(|(k, raster)| {
+            let share = ViewShare { colour: 1.0 / views as f32, geometry: k == views / 2 };
+            self.rasterizer.replay_share(by_image, share, raster);
+        });
+        self.rasterizer.project_views_backward(gaussians, rasters, pose_sums, gradients);
+        let by_view = poses.iter().enumerate();
+        by_view.map(|(k, pose)| pose.by_path(&pose_sums.of_view(k, views))).sum()
     }
 }
 
-/// The mean colour of the views, with the depth and alpha of the one in the middle.
-fn store_mean(views: &[VirtualView], image: &mut RasterImage) {
-    image.clone_from(&views[views.len() / 2].image);
-    for (channel, plane) in image.colour.iter_mut().enumerate() {
-        for (pixel, value) in plane.iter_mut().enumerate() {
-            let sum: f32 = views.iter().map(|view| view.image.colour[channel][pixel]).sum();
-            *value = sum / views.len() as f32;
-        }
+impl VirtualPose {
+    fn new(path: &ExposurePath, time: f64) -> Self {
+        Self { world_from_camera: path.at(time), by_path: path.pose_jacobian(time) }
+    }
+
+    /// The gradient by the parameters of the path.
+    fn by_path(&self, by_view: &ViewGradient) -> SVector<f64, PATH_PARAMETERS> {
+        self.by_path.transpose() * by_view.tangent(&self.world_from_camera)
     }
 }

@@ -4,38 +4,27 @@ use mba_tracker::geometry::RigidTransform;
 use nalgebra::SMatrix;
 
 use super::path::PATH_PARAMETERS;
-use crate::raster::{RasterImage, RasterScratch};
+use crate::raster::{PoseSums, RasterScratch};
 
 /// Everything that rendering an exposure leaves for its backward pass; reused from exposure to exposure, so that
 /// nothing is allocated once the largest one has been seen.
 #[derive(Debug, Default)]
 pub struct ExposureScratch {
-    /// Virtual views; those beyond the last exposure keep their memory.
-    pub(super) views: Vec<VirtualView>,
-    pub(super) used: usize,
+    /// What was rendered, view by view; views beyond the last exposure keep their memory.
+    pub(super) rasters: Vec<RasterScratch>,
+    /// The poses of the views in use.
+    pub(super) poses: Vec<VirtualPose>,
+    pub(super) pose_sums: PoseSums,
     /// By Gaussian.
     pub(super) drawn: Vec<bool>,
 }
 
-/// One virtual view.
-#[derive(Debug)]
-pub(super) struct VirtualView {
-    pub(super) raster: RasterScratch,
-    pub(super) image: RasterImage,
+/// Pose of a virtual view.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct VirtualPose {
     pub(super) world_from_camera: RigidTransform,
-    /// Derivative of its pose by the parameters of the path.
+    /// Its derivative by the parameters of the path.
     pub(super) by_path: SMatrix<f64, 6, PATH_PARAMETERS>,
-}
-
-impl Default for VirtualView {
-    fn default() -> Self {
-        Self {
-            raster: RasterScratch::default(),
-            image: RasterImage::default(),
-            world_from_camera: RigidTransform::identity(),
-            by_path: SMatrix::zeros(),
-        }
-    }
 }
 
 impl ExposureScratch {
@@ -54,25 +43,12 @@ impl ExposureScratch {
     /// Number of virtual views of the last exposure; odd.
     #[must_use]
     pub fn views(&self) -> usize {
-        self.used
+        self.poses.len()
     }
 
     /// Number of (tile, splat) pairs of the last exposure, of all views together.
     #[must_use]
     pub fn pairs(&self) -> usize {
-        self.views[..self.used].iter().map(|view| view.raster.pairs()).sum()
-    }
-
-    /// The virtual views in use.
-    pub(super) fn used_mut(&mut self) -> &mut [VirtualView] {
-        &mut self.views[..self.used]
-    }
-
-    /// Makes room for `views` views.
-    pub(super) fn reset(&mut self, views: usize) {
-        self.used = views;
-        if self.views.len() < views {
-            self.views.resize_with(views, VirtualView::default);
-        }
+        self.rasters[..self.views()].iter().map(RasterScratch::pairs).sum()
     }
 }

@@ -6,13 +6,12 @@ use std::time::{Duration, Instant};
 use serde::{Deserialize, Serialize};
 
 use super::between::all_exposures;
-use super::output::{self, CHECKPOINT_FILE};
 use super::prepare::{self, Frames};
-use super::{MapError, MapSettings, merit};
+use super::{MapError, MapSettings, merit, output};
 use crate::bundle::{BundleAdjustment, BundleState};
 use crate::checkpoint::{Fingerprint, Identity, load, save};
 use crate::dataset::Dataset;
-use crate::run::{MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
+use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
 
 /// A checkpoint is written when this much time has passed.
 const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
@@ -115,14 +114,13 @@ pub fn map_dataset(
         keyframes: bundle.keyframes().len(),
         ..merit::image_figures(dataset, &bundle, writer.folder(), &exposures)
     };
+    writer.remove_checkpoint()?;
     let merit = Merit::of(&exposures, dataset);
-    let summary = writer.finish(|summary| {
+    Ok(writer.finish(|summary| {
         summary.trajectory = merit.trajectory;
         summary.blur = merit.blur;
         summary.map = Some(figures);
-    })?;
-    output::remove_checkpoint(out)?;
-    Ok(summary)
+    })?)
 }
 
 /// The loop of steps and what belongs to it.

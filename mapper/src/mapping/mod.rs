@@ -16,5 +16,4 @@ mod settings;
 
 pub use driver::{MapProgress, map_dataset};
 pub use error::MapError;
-pub use output::{CHECKPOINT_FILE, DEPTH_FOLDER};
 pub use settings::MapSettings;

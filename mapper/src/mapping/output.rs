@@ -1,27 +1,18 @@
 //! What a finished map leaves in the RUN folder.
 
 use std::fs;
-use std::io;
-use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::MapError;
 use super::prepare::Frames;
 use crate::bundle::{BundleAdjustment, FrameState, Keyframe};
 use crate::dataset::Dataset;
 use crate::deblurring::ForwardResponse;
-use crate::gaussians::{Gaussians, write_ply};
+use crate::gaussians::Gaussians;
 use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
 use crate::rendering::SOLID_ALPHA;
-use crate::run::{MAP_FILE, RunError, RunWriter};
+use crate::run::{RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
-
-/// Name of the checkpoint of a run that is not finished.
-pub const CHECKPOINT_FILE: &str = "checkpoint";
-
-/// Name of the folder of the keyframes' depth maps.
-pub const DEPTH_FOLDER: &str = "depth";
 
 /// Fills a run with the poses that it starts from, and brings its folder up to date.
 pub(super) fn push_tracked(writer: &mut RunWriter, frames: &Frames) -> Result<(), RunError> {
@@ -38,16 +29,13 @@ pub(super) fn write(
     bundle: &BundleAdjustment,
     exposures: &[TimedExposure],
     gains: &[f64],
-) -> Result<(), MapError> {
+) -> Result<(), RunError> {
     let mut is_keyframe = vec![false; exposures.len()];
     bundle.keyframes().iter().for_each(|keyframe| is_keyframe[keyframe.index] = true);
     for (index, (exposure, gain)) in exposures.iter().zip(gains).enumerate() {
         writer.refine(index, *exposure, *gain, is_keyframe[index]);
     }
-    let map = writer.folder().join(MAP_FILE);
-    write_ply(&map, &bundle.state.gaussians).map_err(|reason| RunError::unwritable(&map, reason))?;
-    let depth_folder = writer.folder().join(DEPTH_FOLDER);
-    fs::create_dir_all(&depth_folder).map_err(|reason| RunError::unwritable(&depth_folder, reason))?;
+    writer.write_map(&bundle.state.gaussians)?;
     let deblurrer = MapDeblurrer::new(dataset, &bundle.state.gaussians);
     let pairs: Vec<_> = bundle.keyframes().iter().zip(&bundle.state.frames).collect();
     let written: Vec<Result<(), RunError>> = pairs
@@ -109,15 +97,6 @@ impl<'a> MapDeblurrer<'a> {
             if *alpha > SOLID_ALPHA && raw <= f32::from(u16::MAX) { raw as u16 } else { 0 }
         };
         (rgb, image.depth.iter().zip(&image.alpha).map(raw).collect())
-    }
-}
-
-/// Removes the checkpoint of a finished run.
-pub(super) fn remove_checkpoint(folder: &Path) -> Result<(), RunError> {
-    let path: PathBuf = folder.join(CHECKPOINT_FILE);
-    match fs::remove_file(&path) {
-        Err(reason) if reason.kind() != io::ErrorKind::NotFound => Err(RunError::unwritable(&path, reason)),
-        _ => Ok(()),
     }
 }
 

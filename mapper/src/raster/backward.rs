@@ -9,44 +9,57 @@
 //! way, front to back with what remains found by subtraction, divides a difference of large numbers by `1 - alpha`
 //! and loses three digits behind an opaque splat.
 
-use fearless_simd::{Level, dispatch, f32x4, f32x8, prelude::*};
+use fearless_simd::{Level, dispatch, f32x4, prelude::*};
 
 use super::constants::{MAX_ALPHA, MIN_ALPHA};
-use super::falloff::BlockFalloff;
+use super::falloff::{BlockFalloff, Falloff, is_listed, parts};
 use super::forward::{TilePixels, TileSplats};
 use super::lanes::each;
 use super::project::Splat;
-use super::tile::{BLOCK_WIDTH, TILE_COLUMNS, TILE_HEIGHT};
+use super::tile::{BLOCK_WIDTH, CELL, CELL_HEIGHT, CELLS, TILE_COLUMNS};
 
 /// Sums over the pixels of a tile for one splat, with `s` the gradient by the logarithm of alpha, (u, v) the
 /// coordinates in which the splat is round, and `w` the weight: `s`, `s u`, `s v`, `s u^2`, `s u v`, `s v^2`,
 /// `w dL/dI` (three), `w dL/dD`; two unused.
 pub(super) type SplatSums = [f32; 12];
 
-/// What the backward pass keeps of one row of a block.
+/// What the backward pass keeps of a cell.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(C)]
-pub(super) struct GradientRow {
-    pub(super) by_colour: [[f32; BLOCK_WIDTH]; 3],
-    pub(super) by_depth: [f32; BLOCK_WIDTH],
-    pub(super) by_alpha: [f32; BLOCK_WIDTH],
+#[repr(C, align(64))]
+pub(super) struct GradientCell {
+    by_colour: [[f32; CELL]; 3],
+    by_depth: [f32; CELL],
+    by_alpha: [f32; CELL],
     /// Transmittance in front of the splats visited so far.
-    pub(super) transmittance: [f32; BLOCK_WIDTH],
+    transmittance: [f32; CELL],
     /// Worth of everything visited so far, seen through nothing.
-    pub(super) behind: [f32; BLOCK_WIDTH],
-    /// See [`super::forward::PixelRow::end`].
-    pub(super) end: [f32; BLOCK_WIDTH],
+    behind: [f32; CELL],
+    /// See [`super::forward::PixelCell::end`].
+    end: [f32; CELL],
+}
+
+impl GradientCell {
+    /// The given gradient by red, green, blue, depth and alpha.
+    pub(super) fn given_mut(&mut self) -> [&mut [f32; CELL]; 5] {
+        let [red, green, blue] = self.by_colour.each_mut();
+        [red, green, blue, &mut self.by_depth, &mut self.by_alpha]
+    }
+
+    /// Forgets the given gradient.
+    pub(super) fn clear(&mut self) {
+        self.given_mut().into_iter().for_each(|values| *values = [0.0; CELL]);
+    }
 }
 
 /// The gradient by the pixels of a tile, block by block.
-pub(super) type TileGradient = [[GradientRow; TILE_HEIGHT]; TILE_COLUMNS];
+pub(super) type TileGradient = [[GradientCell; CELLS]; TILE_COLUMNS];
 
 /// Ten sums, one vector each.
-struct Sums<S: Simd>([f32x8<S>; 10]);
+struct Sums<S: Simd>([S::f32s; 10]);
 
 /// Writes the sums of every splat of the tile to `sums`, which has the length of its list. `gradient` holds the
-/// gradient by the pixels on entry and is used up.
-pub(super) fn backward(
+/// gradient by the pixels on entry and is used up. Without `GEOMETRY` depth and alpha count as having no gradient.
+pub(super) fn backward<const GEOMETRY: bool>(
     level: Level,
     tile: TileSplats,
     background: &[f32; 3],
@@ -59,39 +72,52 @@ pub(super) fn backward(
     skipped.fill([0.0; 12]);
     dispatch!(level, simd => {
         start(simd, background, pixels, gradient);
-        replay(simd, tile, gradient, composited);
+        replay::<_, GEOMETRY>(simd, tile, gradient, composited);
     });
 }
 
 /// Everything behind the last splat of a pixel is background.
 #[inline(always)]
 fn start<S: Simd>(simd: S, background: &[f32; 3], pixels: &TilePixels, gradient: &mut TileGradient) {
-    let rows = gradient.as_flattened_mut().iter_mut().zip(pixels.blocks.as_flattened());
-    for (row, pixels) in rows {
-        let mut behind = f32x8::splat(simd, 0.0);
-        for (by_colour, &background) in row.by_colour.iter().zip(background) {
-            behind = f32x8::from_slice(simd, by_colour).mul_add(background, behind);
+    let load = |values: &[f32], at: usize| S::f32s::from_slice(simd, &values[at..at + S::f32s::LEN]);
+    let cells = gradient.as_flattened_mut().iter_mut().zip(pixels.blocks.as_flattened());
+    for (cell, pixels) in cells {
+        for at in (0..CELL).step_by(S::f32s::LEN) {
+            let mut behind = S::f32s::splat(simd, 0.0);
+            for (by_colour, &background) in cell.by_colour.iter().zip(background) {
+                behind = load(by_colour, at).mul_add(background, behind);
+            }
+            behind.store_slice(&mut cell.behind[at..at + S::f32s::LEN]);
+            let transmittance = load(&pixels.transmittance, at).abs();
+            transmittance.store_slice(&mut cell.transmittance[at..at + S::f32s::LEN]);
         }
-        behind.store_slice(&mut row.behind);
-        f32x8::from_slice(simd, &pixels.transmittance).abs().store_slice(&mut row.transmittance);
-        row.end = pixels.end;
+        cell.end = pixels.end;
     }
 }
 
 #[inline(always)]
-fn replay<S: Simd>(simd: S, tile: TileSplats, gradient: &mut TileGradient, out: &mut [SplatSums]) {
+fn replay<S: Simd, const GEOMETRY: bool>(
+    simd: S,
+    tile: TileSplats,
+    gradient: &mut TileGradient,
+    out: &mut [SplatSums],
+) {
     let TileSplats { splats, list, origin } = tile;
     let [left, top] = origin.map(|pixel| pixel as f32);
     for (index, (entry, out)) in list.iter().zip(out).enumerate().rev() {
         let splat = &splats[entry.rank as usize];
-        let mut sums = Sums([f32x8::splat(simd, 0.0); 10]);
-        for (block, range) in entry.rows.iter().enumerate() {
+        let mut sums = Sums([S::f32s::splat(simd, 0.0); 10]);
+        for (block, &range) in entry.rows.iter().enumerate() {
             let falloff = BlockFalloff::new(simd, splat, left + (block * BLOCK_WIDTH) as f32);
-            let range = usize::from(range.start)..usize::from(range.end);
-            let mut dy = top + range.start as f32 - splat.centre[1];
-            for row in &mut gradient[block][range] {
-                sums.add(simd, splat, &falloff, dy, index as f32, row);
-                dy += 1.0;
+            let from_centre = top - splat.centre[1];
+            let first = range.cells().start;
+            for (offset, gradient) in gradient[block][range.cells()].iter_mut().enumerate() {
+                let cell = first + offset;
+                let dy = from_centre + (cell * CELL_HEIGHT) as f32;
+                for part in (0..parts::<S>()).filter(|&part| is_listed::<S>(range, cell, part)) {
+                    let at = falloff.at(simd, dy, part);
+                    sums.add::<GEOMETRY>(simd, splat, &at, index as f32, gradient, part);
+                }
             }
         }
         *out = sums.finish(simd);
@@ -99,35 +125,37 @@ fn replay<S: Simd>(simd: S, tile: TileSplats, gradient: &mut TileGradient, out: 
 }
 
 impl<S: Simd> Sums<S> {
-    /// Adds one row and takes its state to the front of the splat.
+    /// Adds vector `part` of a cell and takes its state to the front of the splat.
     #[inline(always)]
-    fn add(
+    fn add<const GEOMETRY: bool>(
         &mut self,
         simd: S,
         splat: &Splat,
-        falloff: &BlockFalloff<S>,
-        dy: f32,
+        at: &Falloff<S>,
         index: f32,
-        row: &mut GradientRow,
+        cell: &mut GradientCell,
+        part: usize,
     ) {
-        let load = |values: &[f32; BLOCK_WIDTH]| f32x8::from_slice(simd, values);
-        let at = falloff.row(dy);
-        let used = at.alpha.simd_ge(MIN_ALPHA as f32) & load(&row.end).simd_gt(index);
-        let zero = f32x8::splat(simd, 0.0);
+        let pixels = part * S::f32s::LEN..(part + 1) * S::f32s::LEN;
+        let load = |values: &[f32; CELL]| S::f32s::from_slice(simd, &values[pixels.clone()]);
+        let used = at.alpha.simd_ge(MIN_ALPHA as f32) & load(&cell.end).simd_gt(index);
+        let zero = S::f32s::splat(simd, 0.0);
         let alpha = used.select(at.alpha, zero);
-        let transmittance = load(&row.transmittance) / (f32x8::splat(simd, 1.0) - alpha);
+        let transmittance = load(&cell.transmittance) / (S::f32s::splat(simd, 1.0) - alpha);
         let weight = alpha * transmittance;
 
-        let by_colour = [load(&row.by_colour[0]), load(&row.by_colour[1]), load(&row.by_colour[2])];
-        let by_depth = load(&row.by_depth);
-        let mut worth = by_depth.mul_add(splat.depth, load(&row.by_alpha));
+        let by_colour = [load(&cell.by_colour[0]), load(&cell.by_colour[1]), load(&cell.by_colour[2])];
+        let mut worth = zero;
+        if GEOMETRY {
+            worth = load(&cell.by_depth).mul_add(splat.depth, load(&cell.by_alpha));
+        }
         for (by_colour, &colour) in by_colour.iter().zip(&splat.colour) {
             worth = by_colour.mul_add(colour, worth);
         }
-        let behind = load(&row.behind);
+        let behind = load(&cell.behind);
         let gain = worth - behind;
-        alpha.mul_add(gain, behind).store_slice(&mut row.behind);
-        transmittance.store_slice(&mut row.transmittance);
+        alpha.mul_add(gain, behind).store_slice(&mut cell.behind[pixels.clone()]);
+        transmittance.store_slice(&mut cell.transmittance[pixels.clone()]);
 
         // At the ceiling alpha does not move.
         let by_logarithm = at.raw.simd_lt(MAX_ALPHA as f32).select(weight * gain, zero);
@@ -143,17 +171,16 @@ impl<S: Simd> Sums<S> {
         for (sum, by_colour) in sums[6..9].iter_mut().zip(by_colour) {
             *sum = weight.mul_add(by_colour, *sum);
         }
-        sums[9] = weight.mul_add(by_depth, sums[9]);
+        if GEOMETRY {
+            sums[9] = weight.mul_add(load(&cell.by_depth), sums[9]);
+        }
     }
 
     #[inline(always)]
     fn finish(self, simd: S) -> SplatSums {
         let [a, b, c, d, e, f, g, h, i, j] = each(
             #[inline(always)]
-            |k| {
-                let (low, high) = self.0[k].split();
-                low + high
-            },
+            |k| fold(simd, self.0[k]),
         );
         let zero = f32x4::splat(simd, 0.0);
         let mut out = [0.0; 12];
@@ -162,6 +189,17 @@ impl<S: Simd> Sums<S> {
         sum_four(i, j, zero, zero).store_slice(&mut out[8..]);
         out
     }
+}
+
+/// The sum of the parts of four numbers of a vector.
+#[inline(always)]
+fn fold<S: Simd>(simd: S, vector: S::f32s) -> f32x4<S> {
+    let part = |k: usize| f32x4::from_slice(simd, &vector.as_slice()[4 * k..4 * k + 4]);
+    let mut sum = part(0);
+    for k in 1..S::f32s::LEN / 4 {
+        sum += part(k);
+    }
+    sum
 }
 
 /// The sums of the elements of four vectors.

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::backward::{SplatSums, TileGradient, backward};
 use super::bin::Bins;
-use super::forward::{TilePixels, TileSplats, composite};
-use super::image::{RasterImage, TileRows, load_gradient};
+use super::forward::{TileCounts, TilePixels, TileSplats, composite};
+use super::image::{RasterImage, ViewTiles, load_gradient, store_mean};
 use super::lanes::ViewNumbers;
 use super::order::{NO_RANK, Order};
 use super::pose::ViewGradient;
@@ -37,7 +37,25 @@ pub struct RasterScratch {
     bins: Bins,
     tiles: Vec<TilePixels>,
     sums: Vec<SplatSums>,
-    view_sums: Vec<ViewSums>,
+    pose_sums: PoseSums,
+}
+
+/// What pieces of Gaussians give to the poses of views, piece by piece.
+#[derive(Debug, Default)]
+pub(crate) struct PoseSums(Vec<ViewSums>);
+
+/// How the gradient by an image is that by one of the views that it shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ViewShare {
+    /// Weight of the view in the colour of the image.
+    pub(crate) colour: f32,
+    /// Whether depth and alpha of the image are those of the view; else they do not depend on it.
+    pub(crate) geometry: bool,
+}
+
+impl ViewShare {
+    /// The image is the view.
+    const WHOLE: Self = Self { colour: 1.0, geometry: true };
 }
 
 /// Gradients of a loss by Gaussians, summed over views.
@@ -79,6 +97,28 @@ impl RasterScratch {
         self.order.len()
     }
 
+    /// Whether Gaussians, an image and gradients have the sizes of the last view.
+    pub(crate) fn fits(
+        &self,
+        gaussians: &Gaussians,
+        image: &RasterImage,
+        gradients: &GaussianGradients,
+    ) -> bool {
+        let grid = self.bins.grid;
+        let same_image = (image.width, image.height) == (grid.width, grid.height);
+        same_image && gaussians.len() == self.projected.len() && gradients.screen.len() == gaussians.len()
+    }
+
+    fn splat_gradients<'a>(&'a self, planes: &'a [&'a [f32]; PARAMETERS]) -> SplatGradients<'a> {
+        SplatGradients {
+            view: &self.view,
+            planes,
+            rank_from_gaussian: &self.order.rank_from_gaussian,
+            bins: &self.bins,
+            sums: &self.sums,
+        }
+    }
+
     /// Number of (tile, splat) pairs of the last view.
     #[must_use]
     pub fn pairs(&self) -> usize {
@@ -104,11 +144,26 @@ impl Rasterizer {
         scratch: &mut RasterScratch,
         image: &mut RasterImage,
     ) {
+        self.render(gaussians, view, true, scratch);
+        self.store_image(scratch, image);
+    }
+
+    /// All of [`Self::forward`] but the image. Without `geometry` depth is left out.
+    pub(crate) fn render(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        geometry: bool,
+        scratch: &mut RasterScratch,
+    ) {
         self.project(gaussians, view, scratch);
         self.order(scratch);
         self.bin(view, scratch);
-        self.composite(scratch);
-        self.store_image(scratch, image);
+        if geometry {
+            self.composite_tiles::<true>(scratch);
+        } else {
+            self.composite_tiles::<false>(scratch);
+        }
     }
 
     /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
@@ -123,10 +178,7 @@ impl Rasterizer {
         scratch: &mut RasterScratch,
         gradients: &mut GaussianGradients,
     ) -> ViewGradient {
-        let grid = scratch.bins.grid;
-        let same_image = (by_image.width, by_image.height) == (grid.width, grid.height);
-        let same_gaussians = gaussians.len() == scratch.projected.len();
-        if !same_image || !same_gaussians || gradients.screen.len() != gaussians.len() {
+        if !scratch.fits(gaussians, by_image, gradients) {
             return ViewGradient::default();
         }
         self.replay(by_image, scratch);
@@ -136,11 +188,17 @@ impl Rasterizer {
     /// Number of Gaussians composited at every pixel of the last view, row by row.
     #[must_use]
     pub fn contributions(&self, scratch: &mut RasterScratch) -> Vec<u32> {
-        self.composite_tiles::<true>(scratch);
-        let grid = scratch.bins.grid;
+        let RasterScratch { bins, order, tiles, .. } = scratch;
+        let grid = bins.grid;
+        tiles.resize(grid.len(), TilePixels::default());
+        let mut counts = vec![TileCounts::default(); grid.len()];
+        let outputs = tiles.par_iter_mut().zip(&mut counts).enumerate();
+        outputs.for_each(|(tile, (pixels, counts))| {
+            composite::<true, true>(self.level, tile_splats(order, bins, tile), pixels, counts);
+        });
         let count = |pixel: usize| {
             let (x, y) = (pixel % grid.width, pixel / grid.width);
-            scratch.tiles[grid.tile_of(x, y)].contributions_at(x, y)
+            counts[grid.tile_of(x, y)].at(x, y)
         };
         (0..grid.width * grid.height).map(count).collect()
     }
@@ -174,54 +232,67 @@ impl Rasterizer {
 
     /// Fourth stage of [`Self::forward`]: composites the splats of every tile.
     pub fn composite(&self, scratch: &mut RasterScratch) {
-        self.composite_tiles::<false>(scratch);
+        self.composite_tiles::<true>(scratch);
     }
 
     /// Last stage of [`Self::forward`]: copies tiles to an image, which gets the size of the view.
     pub fn store_image(&self, scratch: &RasterScratch, image: &mut RasterImage) {
-        let grid = scratch.bins.grid;
-        image.resize(grid.width, grid.height);
-        store_tiles(&scratch.tiles, &grid, &scratch.background, image.tile_rows());
+        self.store_mean(core::slice::from_ref(scratch), image);
     }
 
-    fn composite_tiles<const COUNT: bool>(&self, scratch: &mut RasterScratch) {
+    /// The mean colour of views of one size, with depth and alpha of the one in the middle.
+    pub(crate) fn store_mean(&self, views: &[RasterScratch], image: &mut RasterImage) {
+        let Some(mid) = views.get(views.len() / 2) else {
+            return;
+        };
+        let grid = &mid.bins.grid;
+        image.resize(grid.width, grid.height);
+        let tiles =
+            |view: usize| ViewTiles { tiles: &views[view].tiles, background: &views[view].background };
+        store_mean(&tiles, views.len(), grid, 0..grid.down, image.tile_rows());
+    }
+
+    fn composite_tiles<const DEPTH: bool>(&self, scratch: &mut RasterScratch) {
         let RasterScratch { bins, order, tiles, .. } = scratch;
         tiles.resize(bins.grid.len(), TilePixels::default());
         tiles.par_iter_mut().with_max_len(4).enumerate().for_each(|(tile, pixels)| {
-            composite::<COUNT>(self.level, tile_splats(order, bins, tile), pixels);
+            let splats = tile_splats(order, bins, tile);
+            composite::<DEPTH, false>(self.level, splats, pixels, &mut TileCounts::default());
         });
     }
 
     /// First stage of [`Self::backward`], of which the conditions hold: sums of every splat over every tile.
     pub fn replay(&self, by_image: &RasterImage, scratch: &mut RasterScratch) {
+        self.replay_share(by_image, ViewShare::WHOLE, scratch);
+    }
+
+    /// [`Self::replay`] for an image of which the view has a share.
+    pub(crate) fn replay_share(&self, by_image: &RasterImage, share: ViewShare, scratch: &mut RasterScratch) {
         let mut sums = core::mem::take(&mut scratch.sums);
         sums.resize(scratch.bins.entries.len(), [0.0; 12]);
-        self.replay_tiles(by_image, scratch, 0..scratch.bins.grid.len(), &mut sums);
+        let input = Replay { by_image, share, scratch };
+        self.replay_tiles(&input, 0..scratch.bins.grid.len(), &mut sums);
         scratch.sums = sums;
     }
 
     /// Replays a range of tiles, whose lists have the length of `sums` together.
-    fn replay_tiles(
-        &self,
-        by_image: &RasterImage,
-        scratch: &RasterScratch,
-        tiles: core::ops::Range<usize>,
-        sums: &mut [SplatSums],
-    ) {
+    fn replay_tiles(&self, input: &Replay, tiles: core::ops::Range<usize>, sums: &mut [SplatSums]) {
         if tiles.len() > 1 {
             let middle = tiles.start + tiles.len() / 2;
-            let start = &scratch.bins.tile_start;
+            let start = &input.scratch.bins.tile_start;
             let (left, right) = sums.split_at_mut((start[middle] - start[tiles.start]) as usize);
             rayon::join(
-                || self.replay_tiles(by_image, scratch, tiles.start..middle, left),
-                || self.replay_tiles(by_image, scratch, middle..tiles.end, right),
+                || self.replay_tiles(input, tiles.start..middle, left),
+                || self.replay_tiles(input, middle..tiles.end, right),
             );
         } else if !sums.is_empty() {
-            let (tile, grid) = (tiles.start, &scratch.bins.grid);
+            let Replay { by_image, share, scratch } = input;
+            let tile = tiles.start;
             let mut gradient = TileGradient::default();
-            load_gradient(by_image, grid, tile, &mut gradient);
+            load_gradient(by_image, *share, &scratch.bins.grid, tile, &mut gradient);
             let splats = tile_splats(&scratch.order, &scratch.bins, tile);
             let (pixels, background) = (&scratch.tiles[tile], &scratch.background);
+            let backward = if share.geometry { backward::<true> } else { backward::<false> };
             backward(self.level, splats, background, pixels, &mut gradient, sums);
         }
     }
@@ -233,75 +304,78 @@ impl Rasterizer {
         scratch: &mut RasterScratch,
         gradients: &mut GaussianGradients,
     ) -> ViewGradient {
-        let pieces = gaussians.len().div_ceil(GAUSSIANS_PER_PIECE);
-        scratch.view_sums.resize(pieces, [0.0; 12]);
-        let input = SplatGradients {
-            view: &scratch.view,
-            planes: &slices(gaussians),
-            rank_from_gaussian: &scratch.order.rank_from_gaussian,
-            bins: &scratch.bins,
-            sums: &scratch.sums,
-        };
-        let out = GradientRange { planes: gradients.parameters.planes_mut(), screen: &mut gradients.screen };
-        self.project_pieces_backward(&input, 0, out, &mut scratch.view_sums);
-        sum_in_order(&scratch.view_sums)
+        let mut pose_sums = core::mem::take(&mut scratch.pose_sums);
+        let view = core::slice::from_ref(&*scratch);
+        self.project_views_backward(gaussians, view, &mut pose_sums, gradients);
+        scratch.pose_sums = pose_sums;
+        scratch.pose_sums.of_view(0, 1)
     }
 
-    /// Adds the gradients of the Gaussians `first..` to `out`, one piece per element of `view_sums`.
+    /// [`Self::project_backward`] for views of the same Gaussians, which adds to every gradient view by view.
+    pub(crate) fn project_views_backward(
+        &self,
+        gaussians: &Gaussians,
+        views: &[RasterScratch],
+        pose_sums: &mut PoseSums,
+        gradients: &mut GaussianGradients,
+    ) {
+        let pieces = gaussians.len().div_ceil(GAUSSIANS_PER_PIECE);
+        pose_sums.0.resize(pieces * views.len(), [0.0; 12]);
+        let out = GradientRange { planes: gradients.parameters.planes_mut(), screen: &mut gradients.screen };
+        self.project_pieces_backward(&slices(gaussians), views, 0, out, &mut pose_sums.0);
+    }
+
+    /// Adds the gradients of the Gaussians `first..` to `out`, one piece per number of views of `pose_sums`.
     fn project_pieces_backward(
         &self,
-        input: &SplatGradients,
+        planes: &[&[f32]; PARAMETERS],
+        views: &[RasterScratch],
         first: usize,
         mut out: GradientRange,
-        view_sums: &mut [ViewSums],
+        pose_sums: &mut [ViewSums],
     ) {
-        match view_sums {
-            [] => {}
-            [sum] => *sum = project_backward(self.level, input, first, &mut out),
-            _ => {
-                let middle = view_sums.len() / 2;
-                let count = middle * GAUSSIANS_PER_PIECE;
-                let (left_sums, right_sums) = view_sums.split_at_mut(middle);
-                let (left, right) = out.split_at(count);
-                rayon::join(
-                    || self.project_pieces_backward(input, first, left, left_sums),
-                    || self.project_pieces_backward(input, first + count, right, right_sums),
-                );
+        let pieces = pose_sums.len() / views.len().max(1);
+        if pieces > 1 {
+            let count = pieces / 2 * GAUSSIANS_PER_PIECE;
+            let (left_sums, right_sums) = pose_sums.split_at_mut(pieces / 2 * views.len());
+            let (left, right) = out.split_at(count);
+            rayon::join(
+                || self.project_pieces_backward(planes, views, first, left, left_sums),
+                || self.project_pieces_backward(planes, views, first + count, right, right_sums),
+            );
+        } else {
+            for (sum, view) in pose_sums.iter_mut().zip(views) {
+                *sum = project_backward(self.level, &view.splat_gradients(planes), first, &mut out);
             }
         }
     }
+}
+
+/// What replaying a view needs.
+struct Replay<'a> {
+    by_image: &'a RasterImage,
+    share: ViewShare,
+    scratch: &'a RasterScratch,
 }
 
 fn tile_splats<'a>(order: &'a Order, bins: &'a Bins, tile: usize) -> TileSplats<'a> {
     TileSplats { splats: &order.splats, list: bins.list(tile), origin: bins.grid.origin(tile) }
 }
 
-/// Copies tiles to the rows of an image.
-fn store_tiles(tiles: &[TilePixels], grid: &TileGrid, background: &[f32; 3], mut rows: TileRows) {
-    let down = tiles.len() / grid.across.max(1);
-    if down > 1 {
-        let (upper_tiles, lower_tiles) = tiles.split_at(down / 2 * grid.across);
-        let (upper, lower) = rows.split_at(down / 2);
-        rayon::join(
-            || store_tiles(upper_tiles, grid, background, upper),
-            || store_tiles(lower_tiles, grid, background, lower),
-        );
-    } else {
-        rows.store(tiles, background);
-    }
-}
-
 fn slices(gaussians: &Gaussians) -> [&[f32]; PARAMETERS] {
     gaussians.planes().each_ref().map(Vec::as_slice)
 }
 
-fn sum_in_order(pieces: &[ViewSums]) -> ViewGradient {
-    let mut total = [0.0; 12];
-    for piece in pieces {
-        total.iter_mut().zip(piece).for_each(|(total, &sum)| *total += f64::from(sum));
-    }
-    ViewGradient {
-        rotation: Matrix3::from_fn(|i, j| total[4 * i + j]),
-        translation: Vector3::from_fn(|i, _| total[4 * i + 3]),
+impl PoseSums {
+    /// The gradient by the pose of view `view` of `views`: the pieces in their order.
+    pub(crate) fn of_view(&self, view: usize, views: usize) -> ViewGradient {
+        let mut total = [0.0; 12];
+        for piece in self.0.iter().skip(view).step_by(views.max(1)) {
+            total.iter_mut().zip(piece).for_each(|(total, &sum)| *total += f64::from(sum));
+        }
+        ViewGradient {
+            rotation: Matrix3::from_fn(|i, j| total[4 * i + j]),
+            translation: Vector3::from_fn(|i, _| total[4 * i + 3]),
+        }
     }
 }

@@ -6,7 +6,7 @@
 
 use core::f32::consts::LOG2_E;
 
-use fearless_simd::{f32x8, i32x8, prelude::*};
+use fearless_simd::{f32x8, prelude::*};
 
 const ROUNDING: f32 = 12_582_912.0;
 
@@ -42,11 +42,11 @@ const LN_2: [f32; 2] = [355.0 / 512.0, -2.121_944_4e-4];
 
 /// `2^-x` within 3e-7 relatively for `0 <= x <= 24`; larger arguments count as 24, small negative ones are allowed.
 #[inline(always)]
-pub(super) fn exp2_of_minus<S: Simd>(x: f32x8<S>) -> f32x8<S> {
+pub(super) fn exp2_of_minus<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
     let x = x.min(FAINTEST);
-    let shifted = f32x8::splat(x.token(), ROUNDING) - x;
+    let shifted = V::splat(simd, ROUNDING) - x;
     let fraction = x + (shifted - ROUNDING);
-    scale_by_power(polynomial(fraction, &EXP2_OF_MINUS), shifted)
+    scale_by_power(polynomial(simd, fraction, &EXP2_OF_MINUS), shifted)
 }
 
 /// `exp(x)` within 3e-7 relatively for `|x| <= 87`; arguments beyond count as 87 or -87. The result for NaN is
@@ -57,18 +57,18 @@ pub(super) fn exp<S: Simd>(x: f32x8<S>) -> f32x8<S> {
     let shifted = x * LOG2_E + ROUNDING;
     let power = shifted - ROUNDING;
     let rest = x - power * LN_2[0];
-    scale_by_power(polynomial(rest - power * LN_2[1], &EXP), shifted)
+    scale_by_power(polynomial(x.token(), rest - power * LN_2[1], &EXP), shifted)
 }
 
 #[inline(always)]
-fn polynomial<S: Simd>(x: f32x8<S>, coefficients: &[f32; 6]) -> f32x8<S> {
+fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V, coefficients: &[f32; 6]) -> V {
     let [c0, c1, c2, c3, c4, c5] = *coefficients;
-    let high = x.mul_add(c5, f32x8::splat(x.token(), c4));
+    let high = x.mul_add(c5, V::splat(simd, c4));
     x.mul_add(x.mul_add(x.mul_add(x.mul_add(high, c3), c2), c1), c0)
 }
 
 /// `value 2^n`, where the lowest bits of `shifted` hold the integer n.
 #[inline(always)]
-fn scale_by_power<S: Simd>(value: f32x8<S>, shifted: f32x8<S>) -> f32x8<S> {
-    (value.bitcast::<i32x8<S>>() + (shifted.bitcast::<i32x8<S>>() << 23)).bitcast()
+fn scale_by_power<S: Simd, V: SimdFloat<S, Element = f32>>(value: V, shifted: V) -> V {
+    V::from_bits(value.to_bits() + (shifted.to_bits() << 23))
 }

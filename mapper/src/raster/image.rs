@@ -1,8 +1,11 @@
 //! Rendered images, and gradients by them.
 
-use super::backward::{GradientRow, TileGradient};
-use super::forward::TilePixels;
-use super::tile::{BLOCK_WIDTH, TILE_HEIGHT, TILE_WIDTH, TileGrid};
+use core::ops::Range;
+
+use super::backward::{GradientCell, TileGradient};
+use super::driver::ViewShare;
+use super::forward::{PixelCell, TilePixels};
+use super::tile::{BLOCK_WIDTH, CELL, CELL_HEIGHT, CELLS, TILE_COLUMNS, TILE_HEIGHT, TILE_WIDTH, TileGrid};
 
 /// A rendered view, or the gradient of a loss by one: five planes of numbers, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -34,6 +37,12 @@ impl RasterImage {
         planes.for_each(|plane| plane.resize(width * height, 0.0));
     }
 
+    /// Red, green, blue, depth and alpha.
+    fn planes(&self) -> [&[f32]; 5] {
+        let [red, green, blue] = self.colour.each_ref().map(Vec::as_slice);
+        [red, green, blue, &self.depth, &self.alpha]
+    }
+
     /// The rows of tiles from the top, each with its five planes.
     pub(super) fn tile_rows(&mut self) -> TileRows<'_> {
         let [red, green, blue] = self.colour.each_mut().map(Vec::as_mut_slice);
@@ -63,26 +72,24 @@ impl TileRows<'_> {
         (Self { width, planes: upper }, Self { width, planes: lower })
     }
 
-    /// Copies the tiles of one row of tiles.
-    pub(super) fn store(&mut self, tiles: &[TilePixels], background: &[f32; 3]) {
-        for (across, tile) in tiles.iter().enumerate() {
-            for (block, rows) in tile.blocks.iter().enumerate() {
+    /// Stores one row of tiles, given by the planes of their cells.
+    fn store(&mut self, grid: &TileGrid, mean: impl Fn(usize, usize, usize) -> [[f32; CELL]; 5]) {
+        let rows = self.planes[0].len() / grid.width.max(1);
+        for across in 0..grid.across {
+            for block in 0..TILE_COLUMNS {
                 let left = across * TILE_WIDTH + block * BLOCK_WIDTH;
-                let columns = BLOCK_WIDTH.min(self.width.saturating_sub(left));
-                for (y, row) in rows.iter().enumerate() {
-                    let first = y * self.width + left;
-                    if columns == 0 || first + columns > self.planes[0].len() {
-                        break;
-                    }
-                    let [red, green, blue, depth, alpha] =
-                        self.planes.each_mut().map(|plane| &mut plane[first..first + columns]);
-                    for x in 0..columns {
-                        let transmittance = row.transmittance[x].abs();
-                        red[x] = row.colour[0][x] + transmittance * background[0];
-                        green[x] = row.colour[1][x] + transmittance * background[1];
-                        blue[x] = row.colour[2][x] + transmittance * background[2];
-                        depth[x] = row.depth[x];
-                        alpha[x] = 1.0 - transmittance;
+                if left >= grid.width {
+                    break;
+                }
+                for cell in 0..CELLS {
+                    let mean = mean(across, block, cell);
+                    let first = cell * CELL_HEIGHT;
+                    for (row, y) in (first..rows.min(first + CELL_HEIGHT)).enumerate() {
+                        let to = y * grid.width + left..(y + 1) * grid.width;
+                        for (plane, values) in self.planes.iter_mut().zip(&mean) {
+                            let values = &values[row * BLOCK_WIDTH..(row + 1) * BLOCK_WIDTH];
+                            store_columns(values, &mut plane[to.clone()]);
+                        }
                     }
                 }
             }
@@ -90,23 +97,105 @@ impl TileRows<'_> {
     }
 }
 
-/// The gradient by the pixels of a tile; zero beyond the image.
-pub(super) fn load_gradient(image: &RasterImage, grid: &TileGrid, tile: usize, out: &mut TileGradient) {
-    *out = TileGradient::default();
-    let [left, top] = grid.origin(tile);
-    for (block, rows) in out.iter_mut().enumerate() {
-        let left = left + block * BLOCK_WIDTH;
-        let columns = BLOCK_WIDTH.min(grid.width.saturating_sub(left));
-        if columns == 0 {
-            break;
-        }
-        for (row, y) in rows.iter_mut().zip(top..grid.height) {
-            let GradientRow { by_colour, by_depth, by_alpha, .. } = row;
-            let first = y * grid.width + left;
-            let planes = image.colour.iter().chain([&image.depth, &image.alpha]);
-            for (row, plane) in by_colour.iter_mut().chain([by_depth, by_alpha]).zip(planes) {
-                row[..columns].copy_from_slice(&plane[first..first + columns]);
+/// Copies as many of the columns of a block as the rest of the row has.
+#[inline(always)]
+fn store_columns(values: &[f32], rest: &mut [f32]) {
+    if let Some(whole) = rest.first_chunk_mut::<BLOCK_WIDTH>() {
+        whole.copy_from_slice(values);
+    } else {
+        rest.copy_from_slice(&values[..rest.len()]);
+    }
+}
+
+/// What a view has composited.
+#[derive(Clone, Copy)]
+pub(super) struct ViewTiles<'a> {
+    pub(super) tiles: &'a [TilePixels],
+    pub(super) background: &'a [f32; 3],
+}
+
+/// Stores the mean of `count` views in the rows of tiles `down`, with depth and alpha of the view in the middle.
+pub(super) fn store_mean<'a>(
+    view: &(impl Fn(usize) -> ViewTiles<'a> + Sync),
+    count: usize,
+    grid: &TileGrid,
+    down: Range<usize>,
+    mut rows: TileRows,
+) {
+    if down.len() > 1 {
+        let middle = down.start + down.len() / 2;
+        let (upper, lower) = rows.split_at(middle - down.start);
+        rayon::join(
+            || store_mean(view, count, grid, down.start..middle, upper),
+            || store_mean(view, count, grid, middle..down.end, lower),
+        );
+    } else if !down.is_empty() {
+        rows.store(grid, |across, block, cell| {
+            let tile = down.start * grid.across + across;
+            let mid = &view(count / 2).tiles[tile].blocks[block][cell];
+            let [red, green, blue] = mean_colour(view, count, |tiles| &tiles[tile].blocks[block][cell]);
+            [red, green, blue, mid.depth, mid.transmittance.map(|left| 1.0 - left.abs())]
+        });
+    }
+}
+
+/// The mean colour of a cell over the views.
+#[inline]
+fn mean_colour<'a>(
+    view: &impl Fn(usize) -> ViewTiles<'a>,
+    count: usize,
+    cell: impl Fn(&'a [TilePixels]) -> &'a PixelCell,
+) -> [[f32; CELL]; 3] {
+    let mut sums = [[0.0; CELL]; 3];
+    for ViewTiles { tiles, background } in (0..count).map(view) {
+        let cell = cell(tiles);
+        for ((sums, colour), background) in sums.iter_mut().zip(&cell.colour).zip(background) {
+            for (pixel, sum) in sums.iter_mut().enumerate() {
+                *sum += colour[pixel] + cell.transmittance[pixel].abs() * background;
             }
         }
+    }
+    let share = 1.0 / count as f32;
+    sums.map(|channel| channel.map(|sum| sum * share))
+}
+
+/// The gradient by the pixels of a tile of a view with a share in the image; zero beyond the image.
+pub(super) fn load_gradient(
+    image: &RasterImage,
+    share: ViewShare,
+    grid: &TileGrid,
+    tile: usize,
+    out: &mut TileGradient,
+) {
+    let planes = if share.geometry { 5 } else { 3 };
+
+    let [left, top] = grid.origin(tile);
+    if left + TILE_WIDTH > grid.width || top + TILE_HEIGHT > grid.height {
+        out.as_flattened_mut().iter_mut().for_each(GradientCell::clear);
+    }
+    for (block, cells) in out.iter_mut().enumerate() {
+        let left = left + block * BLOCK_WIDTH;
+        if left >= grid.width {
+            break;
+        }
+        for y in 0..TILE_HEIGHT.min(grid.height - top) {
+            let from = (top + y) * grid.width + left..(top + y + 1) * grid.width;
+            let at = y % CELL_HEIGHT * BLOCK_WIDTH;
+            let rows = cells[y / CELL_HEIGHT].given_mut().map(|values| &mut values[at..at + BLOCK_WIDTH]);
+            for (k, (row, plane)) in rows.into_iter().zip(image.planes()).take(planes).enumerate() {
+                let weight = if k < 3 { share.colour } else { 1.0 };
+                load_columns(weight, &plane[from.clone()], row);
+            }
+        }
+    }
+}
+
+/// Multiplies as many columns of a block as the rest of the row has.
+#[inline(always)]
+fn load_columns(weight: f32, rest: &[f32], values: &mut [f32]) {
+    if let Some(whole) = rest.first_chunk::<BLOCK_WIDTH>() {
+        values.iter_mut().zip(whole).for_each(|(value, given)| *value = weight * given);
+    } else {
+        values.iter_mut().zip(rest).for_each(|(value, given)| *value = weight * given);
     }
 }

@@ -27,5 +27,6 @@ mod tile;
 mod view;
 
 pub use driver::{GaussianGradients, RasterScratch, Rasterizer};
+pub(crate) use driver::{PoseSums, ViewShare};
 pub use image::RasterImage;
 pub use view::RasterView;

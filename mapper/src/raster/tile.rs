@@ -1,9 +1,19 @@
 //! Tiles: the unit of lists and of work.
 
-/// Pixels of a row that are computed together: one vector.
+/// Width of a block, the unit in which the lists of splats know columns, in pixels.
 pub(super) const BLOCK_WIDTH: usize = 8;
 
-/// Vectors side by side in a tile.
+/// Rows of a cell. What is accumulated at the pixels of a cell lies together in memory, so that a cell is one vector
+/// of the widest instruction set, and a whole number of those of the others.
+pub(super) const CELL_HEIGHT: usize = 2;
+
+/// Pixels of a cell, row by row.
+pub(super) const CELL: usize = CELL_HEIGHT * BLOCK_WIDTH;
+
+/// Cells of a block, one below the other.
+pub(super) const CELLS: usize = TILE_HEIGHT / CELL_HEIGHT;
+
+/// Blocks side by side in a tile.
 pub(super) const TILE_COLUMNS: usize = 2;
 
 /// Width of a tile in pixels.
@@ -56,6 +66,13 @@ pub(super) struct TileEntry {
     pub(super) rank: u32,
     /// Rows of every block of the tile that the splat touches.
     pub(super) rows: [RowRange; TILE_COLUMNS],
+}
+
+impl RowRange {
+    /// The cells in which the rows lie.
+    pub(super) fn cells(self) -> core::ops::Range<usize> {
+        usize::from(self.start) / CELL_HEIGHT..usize::from(self.end).div_ceil(CELL_HEIGHT)
+    }
 }
 
 impl TileEntry {

@@ -12,18 +12,18 @@
 //! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
 
 mod camera;
-mod deblurred;
 mod error;
 mod frame_record;
+mod keyframe_images;
 mod merit;
 mod reader;
 mod summary;
 mod writer;
 
 pub use camera::{RunCamera, RunResponse};
-pub use deblurred::{DEBLURRED_FOLDER, deblurred_path};
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
+pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
 pub use merit::{Merit, mid_pose};
 pub use reader::Run;
 pub use summary::{FrameCounts, MapFigures, RunSettings, Spread, Summary};
@@ -39,3 +39,5 @@ pub const FRAMES_FILE: &str = "frames.csv";
 pub const MAP_FILE: &str = "map.ply";
 /// Name of the summary.
 pub const SUMMARY_FILE: &str = "summary.json";
+/// Name of what a run that was stopped goes on from.
+pub const CHECKPOINT_FILE: &str = "checkpoint";

@@ -4,10 +4,11 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::deblurred::remove_deblurred;
+use super::keyframe_images::remove_keyframe_images;
 use super::merit::mid_pose;
-use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
+use super::{CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
 use super::{FrameRecord, RunError, RunSettings, Summary, frame_record};
+use crate::gaussians::{Gaussians, format_ply};
 use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use crate::whole_file::write_together;
 
@@ -38,7 +39,7 @@ impl RunWriter {
     /// [`RunError::Unwritable`] or [`RunError::DiskFull`].
     pub fn create(folder: &Path, settings: RunSettings) -> Result<Self, RunError> {
         fs::create_dir_all(folder).map_err(|reason| RunError::unwritable(folder, reason))?;
-        remove_deblurred(folder)?;
+        remove_keyframe_images(folder)?;
         let mut writer = Self {
             folder: folder.to_owned(),
             settings,
@@ -83,6 +84,17 @@ impl RunWriter {
         }
     }
 
+    /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map;
+    /// nothing happens if there is no such frame.
+    pub fn refine(&mut self, index: usize, exposure: TimedExposure, gain: f64, is_keyframe: bool) {
+        if let (Some(old), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
+            *old = exposure;
+            record.gain = gain;
+            record.keyframe = u8::from(is_keyframe);
+            self.unwritten += 1;
+        }
+    }
+
     /// Adds a sentence about the input to the summary.
     pub fn warn(&mut self, warning: String) {
         self.warnings.push(warning);
@@ -101,6 +113,28 @@ impl RunWriter {
         all.filter(|(_, (_, record))| record.keyframe != 0)
             .map(|(index, (exposure, _))| (index, *exposure))
             .collect()
+    }
+
+    /// Writes the map of the run.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn write_map(&self, map: &Gaussians) -> Result<(), RunError> {
+        write_together(&[(self.folder.join(MAP_FILE), format_ply(map))]).map_err(RunError::from_write)
+    }
+
+    /// Removes the checkpoint of a run that is finished.
+    ///
+    /// # Errors
+    /// [`RunError::Unwritable`].
+    pub fn remove_checkpoint(&self) -> Result<(), RunError> {
+        let path = self.folder.join(CHECKPOINT_FILE);
+        match fs::remove_file(&path) {
+            Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
+                Err(RunError::unwritable(&path, reason))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Counts a keyframe whose deblurred image was written.

@@ -1,5 +1,7 @@
 //! The command line.
 
+pub mod map;
+
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -51,6 +53,8 @@ pub enum Command {
     Info(Info),
     /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
     Track(Track),
+    /// Make a sharp map of a tracked data set, refine all poses and deblur keyframes
+    Map(map::Map),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
     /// Write report.html and charts into a RUN folder

@@ -4,6 +4,7 @@ pub mod demo;
 pub mod eval_images;
 pub mod eval_trajectory;
 pub mod info;
+pub mod map;
 pub mod open;
 pub mod render;
 pub mod report;

@@ -11,7 +11,8 @@ use super::engine::{Engine, Exposure};
 use super::frame_state::FrameState;
 use super::loss::LossTerms;
 use super::observation::{Observation, ObservationPyramid, Sensor};
-use super::path_step::{PathPrior, PathStep, PathUnits};
+use super::path_metric::PathMetric;
+use super::path_step::{PathPrior, PathStep};
 use super::schedule::{Schedule, StepPlan};
 use super::seeding;
 use crate::gaussians::Gaussians;
@@ -41,6 +42,18 @@ pub struct Keyframe {
     pub prior: PathPrior,
     /// Typical depth, metres.
     pub depth: f64,
+    /// Coordinates of its path.
+    pub metric: PathMetric,
+}
+
+impl Keyframe {
+    /// Frame `index` of the data set.
+    #[must_use]
+    pub fn new(index: usize, observation: ObservationPyramid, prior: PathPrior) -> Self {
+        let depth = typical_depth(observation.level(0));
+        let metric = PathMetric::new(observation.level(1), depth);
+        Self { index, observation, prior, depth, metric }
+    }
 }
 
 /// All that changes from step to step: enough to go on after an interruption.
@@ -165,10 +178,9 @@ impl BundleAdjustment {
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
         if plan.path_pixels > 0.0 {
-            let units = path_units(&self.sensor, keyframe.depth);
             let step =
                 PathStep { pixels: plan.path_pixels, hold_middle: is_first, still: !self.settings.blur };
-            frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, units, step);
+            frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, &keyframe.metric, step);
             if !is_first {
                 frame.log_gain += frame.gain_moments.step(loss.by_log_gain, plan.log_gain);
             }
@@ -184,22 +196,19 @@ impl BundleAdjustment {
     /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution.
     pub fn fit_frame(
         &mut self,
-        observation: &ObservationPyramid,
-        depth: f64,
-        prior: &PathPrior,
+        unmapped: &Keyframe,
         frame: &mut FrameState,
         count: usize,
     ) {
         let plan = StepPlan { level: 1, spacing: 2.0, ..self.schedule.plan(0.1, false) };
-        let seen = observation.level(plan.level);
-        let units = path_units(&self.sensor, depth);
+        let seen = unmapped.observation.level(plan.level);
         for k in 0..count {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
-            let views = self.settings.views(frame.blur_px(&seen.camera, depth), &plan);
+            let views = self.settings.views(frame.blur_px(&seen.camera, unmapped.depth), &plan);
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
             let loss = self.engine.evaluate(&self.state.gaussians, exposure, &plan);
             let step = PathStep { pixels: 0.3 * shrink, hold_middle: false, still: !self.settings.blur };
-            frame.path_moments.step(&mut frame.path, &loss.by_path, prior, units, step);
+            frame.path_moments.step(&mut frame.path, &loss.by_path, &unmapped.prior, &unmapped.metric, step);
             frame.log_gain += frame.gain_moments.step(loss.by_log_gain, 0.01 * shrink);
         }
     }
@@ -243,19 +252,13 @@ impl BundleSettings {
 }
 
 /// Typical depth of an observation, metres; 2 where nothing was measured.
-#[must_use]
-pub fn typical_depth(seen: &Observation) -> f64 {
+fn typical_depth(seen: &Observation) -> f64 {
     let mut depths: Vec<f32> = seen.depth.iter().copied().filter(|depth| *depth > 0.0).step_by(7).collect();
     if depths.is_empty() {
         return 2.0;
     }
     let middle = depths.len() / 2;
     f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1)
-}
-
-fn path_units(sensor: &Sensor, depth: f64) -> PathUnits {
-    let radians = 1.0 / sensor.camera.fx;
-    PathUnits { metres: depth * radians, radians }
 }
 
 /// The numbers below `count` in an order that depends on seed and round only (Fisher and Yates 1938).

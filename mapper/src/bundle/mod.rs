@@ -12,15 +12,17 @@ mod engine;
 mod frame_state;
 mod loss;
 mod observation;
+mod path_metric;
 mod path_step;
 mod schedule;
 mod seeding;
 
-pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport, typical_depth};
+pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport};
 pub use display::DisplayCurve;
 pub use engine::{Engine, Exposure, ExposureLoss};
 pub use frame_state::FrameState;
 pub use loss::{LossTerms, LossWeights};
 pub use observation::{Observation, ObservationPyramid, Sensor};
+pub use path_metric::PathMetric;
 pub use path_step::PathPrior;
 pub use schedule::{Schedule, Stage, StepPlan};

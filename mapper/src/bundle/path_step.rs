@@ -3,6 +3,7 @@
 use nalgebra::{SMatrix, SVector, Vector6};
 use serde::{Deserialize, Serialize};
 
+use super::path_metric::PathMetric;
 use crate::continuity::MotionPrediction;
 use crate::exposure::{ExposurePath, PATH_PARAMETERS};
 
@@ -16,10 +17,13 @@ const PRIOR_COST: f64 = 2e-5;
 /// Standard deviation of the bow, pixels: hands turn round within few exposures only.
 const BOW_PX: f64 = 2.0;
 
+/// Longest move of a block, in lengths of the step.
+const LONGEST: f64 = 3.0;
+
 /// Moments of the gradients of one path.
 ///
-/// The parameters are the middle, the motion from opening to closing and the bow, each six numbers in units that move
-/// the picture by about a pixel. In these coordinates the problem nearly falls apart into three: the middle says where
+/// The parameters are the middle, the motion from opening to closing and the bow, each six numbers in the units of a
+/// [`PathMetric`], which move the picture by about a pixel. In these coordinates the problem nearly falls apart into three: the middle says where
 /// the picture is, the motion how it is smeared, the bow in which shape. All directions share one scale of step, that
 /// of the middle, so that what the picture does not show hardly moves: Adam's own scales would let it wander.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,27 +32,13 @@ pub struct PathMoments {
     /// Mean squared gradient by one number of the middle.
     second: f64,
     updates: u32,
+    /// The bow in units of the metric.
+    bow_units: [f64; 6],
 }
 
 impl Default for PathMoments {
     fn default() -> Self {
-        Self { first: [[0.0; 6]; 3], second: 0.0, updates: 0 }
-    }
-}
-
-/// How far one pixel is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathUnits {
-    /// Metres per pixel at the typical depth.
-    pub metres: f64,
-    /// Radians per pixel.
-    pub radians: f64,
-}
-
-impl PathUnits {
-    fn tangent(self) -> Vector6<f64> {
-        let Self { metres, radians } = self;
-        Vector6::new(metres, metres, metres, radians, radians, radians)
+        Self { first: [[0.0; 6]; 3], second: 0.0, updates: 0, bow_units: [0.0; 6] }
     }
 }
 
@@ -77,23 +67,24 @@ impl PathMoments {
         path: &mut ExposurePath,
         gradient: &SVector<f64, PATH_PARAMETERS>,
         prior: &PathPrior,
-        units: PathUnits,
+        metric: &PathMetric,
         step: PathStep,
     ) {
-        let unit = units.tangent();
-        let [middle, motion, bow] = by_coordinates(gradient).map(|g| g.component_mul(&unit));
-        let motion = motion + prior.gradient_by_motion(path, unit);
-        let bow = bow + path.bow.component_div(&unit) * (PRIOR_COST / (BOW_PX * BOW_PX));
+        let [middle, motion, bow] = by_coordinates(gradient).map(|block| metric.by_units(path, &block));
         self.updates += 1;
         let updates = self.updates.min(10_000) as i32;
         let corrections = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powi(updates)));
         self.second = BETA_2 * self.second + (1.0 - BETA_2) * middle.norm_squared() / 6.0;
-        let scale = -step.pixels * corrections[0] / ((self.second * corrections[1]).sqrt() + 1e-20);
+        let typical = (self.second * corrections[1]).sqrt() + 1e-20;
+        let prior_motion = metric.by_units(path, &prior.gradient_by_motion(path));
+        let prior_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
+        let gradients = [middle, motion + capped(prior_motion, typical), bow + capped(prior_bow, typical)];
+        let scale = -step.pixels * corrections[0] / typical;
         let mut moves = [Vector6::zeros(); 3];
-        for (block, (mean, gradient)) in self.first.iter_mut().zip([middle, motion, bow]).enumerate() {
+        for (block, (mean, gradient)) in self.first.iter_mut().zip(gradients).enumerate() {
             let mean_now = Vector6::from(*mean) * BETA_1 + gradient * (1.0 - BETA_1);
             *mean = mean_now.into();
-            moves[block] = (mean_now * scale).component_mul(&unit);
+            moves[block] = capped(mean_now * scale, LONGEST * step.pixels);
         }
         if step.hold_middle {
             moves[0].fill(0.0);
@@ -101,19 +92,26 @@ impl PathMoments {
         if step.still {
             moves[1..].iter_mut().for_each(|block| block.fill(0.0));
         }
-        *path = path.perturbed(&from_coordinates(&moves));
+        self.bow_units = (Vector6::from(self.bow_units) + moves[2]).into();
+        let tangents = moves.map(|units| metric.tangent(path, &units));
+        *path = path.perturbed(&from_coordinates(&tangents));
     }
 }
 
 impl PathPrior {
-    /// Gradient of the prior by the motion, in pixels.
-    fn gradient_by_motion(&self, path: &ExposurePath, unit: Vector6<f64>) -> Vector6<f64> {
+    /// Gradient of the prior by the motion.
+    fn gradient_by_motion(&self, path: &ExposurePath) -> Vector6<f64> {
         let Some(prediction) = self.motion else { return Vector6::zeros() };
         let [t, r] = [prediction.translation_sigma, prediction.rotation_sigma].map(|sigma| sigma * sigma);
         let variance = Vector6::new(t, t, t, r, r, r);
-        let excess = path.ends.motion() - prediction.motion;
-        excess.component_div(&variance).component_mul(&unit) * PRIOR_COST
+        (path.ends.motion() - prediction.motion).component_div(&variance) * PRIOR_COST
     }
+}
+
+/// A vector of at most that length: a prior is never stronger than the picture, and no step runs away.
+fn capped(vector: Vector6<f64>, length: f64) -> Vector6<f64> {
+    let norm = vector.norm();
+    if norm > length { vector * (length / norm) } else { vector }
 }
 
 /// Gradients by middle, motion and bow.

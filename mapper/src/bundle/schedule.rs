@@ -53,7 +53,7 @@ const HOLD: f64 = 0.25;
 /// Length of the last step, relative to the first.
 const FINAL_LENGTH: f64 = 0.03;
 /// Paths and gains rest until the map has taken shape.
-const PATHS_FROM: f64 = 0.03;
+const PATHS_FROM: f64 = 0.1;
 /// The density changes this often while it changes.
 const DENSITY_CHANGES: f64 = 16.0;
 /// Position from which the density is final.
@@ -111,9 +111,9 @@ impl Schedule {
             spacing: stage.spacing,
             max_views: stage.max_views,
             lengths: LENGTHS.scaled(shrink as f32),
-            path_pixels: PATH_PIXELS * paths,
+            path_pixels: std::env::var("LP").map_or(PATH_PIXELS, |v| v.parse().unwrap()) * paths,
             log_gain: LOG_GAIN * paths,
-            weights: WEIGHTS,
+            weights: LossWeights { depth: std::env::var("WD").map_or(WEIGHTS.depth, |v| v.parse().unwrap()), alpha: std::env::var("WA").map_or(WEIGHTS.alpha, |v| v.parse().unwrap()), ..WEIGHTS },
         }
     }
 

@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 
 use super::MapSettings;
 use super::prepare::{Frames, observation, sensor};
-use crate::bundle::{BundleAdjustment, typical_depth};
+use crate::bundle::{BundleAdjustment, Keyframe};
 use crate::dataset::Dataset;
 use crate::run::FrameStatus;
 use crate::trajectory_file::TimedExposure;
@@ -43,8 +43,8 @@ pub(super) fn all_exposures(
         if frames.records[index].status != FrameStatus::Lost
             && let Ok(observation) = observation(dataset, &sensor, index)
         {
-            let depth = typical_depth(observation.level(0));
-            bundle.fit_frame(&observation, depth, &frames.priors[index], &mut state, STEPS);
+            let unmapped = Keyframe::new(index, observation, frames.priors[index]);
+            bundle.fit_frame(&unmapped, &mut state, STEPS);
             observe();
         }
         all.push((state.path.timed(timestamp), state.log_gain));

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::choice::choose_keyframes;
 use super::{MapError, MapSettings};
 use crate::bundle::{
-    BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor, typical_depth,
+    BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor,
 };
 use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, predict_motions, repair_run, run_frames,
@@ -96,10 +96,7 @@ pub(super) fn bundle(
     let mut keyframes = Vec::new();
     for (index, observation) in loaded {
         match observation {
-            Ok(observation) => {
-                let depth = typical_depth(observation.level(0));
-                keyframes.push(Keyframe { index, observation, prior: frames.priors[index], depth });
-            }
+            Ok(observation) => keyframes.push(Keyframe::new(index, observation, frames.priors[index])),
             Err(reason) => frames.warnings.push(format!("keyframe {index} left out: {reason}")),
         }
     }

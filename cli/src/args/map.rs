@@ -1,0 +1,111 @@
+//! Arguments of `mba map`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use mba_mapper::mapping::MapSettings;
+
+use super::BlurMode;
+
+/// Arguments of `mba map`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+RUN2 gets map.ply, which opens in any viewer of Gaussian splats, deblurred/ and depth/ with a PNG per keyframe, \
+and refined poses of all frames in the files that `mba track` writes.
+
+A run that was stopped, by a kill too, goes on with --resume and ends with the same files as one that was not.
+
+Examples:
+  mba track data --out run && mba map data --trajectory run --out mapped
+  mba map data --trajectory run --out mapped --time-budget 120")]
+pub struct Map {
+    /// Folder of the data set
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// RUN folder of the tracked data set
+    #[arg(long, value_name = "RUN")]
+    pub trajectory: PathBuf,
+    /// RUN folder that is written
+    #[arg(long, value_name = "RUN2")]
+    pub out: PathBuf,
+    /// Go on from the checkpoint in RUN2, if there is one
+    #[arg(long)]
+    pub resume: bool,
+    /// How the map is made.
+    #[command(flatten)]
+    pub mapping: Mapping,
+}
+
+/// How a map is made.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Mapping {
+    /// What the map consists of
+    #[arg(long, value_enum, default_value_t)]
+    pub field: Field,
+    /// Time for all of it in seconds; default: as long as the schedule takes
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub time_budget: Option<Duration>,
+    /// Model of the motion during the exposure
+    #[arg(long, value_enum, default_value_t)]
+    pub blur: BlurMode,
+    /// At most this many virtual views per exposure
+    #[arg(long, value_name = "N")]
+    pub virtual_views: Option<NonZeroUsize>,
+    /// At most this many keyframes; the other frames are fitted to the finished map
+    #[arg(long, value_name = "N", default_value_t = default_keyframes())]
+    pub max_keyframes: NonZeroUsize,
+    /// At most this many Gaussians; default: a third of the pixels of an image
+    #[arg(long, value_name = "N")]
+    pub max_gaussians: Option<NonZeroUsize>,
+    /// Seed of the order in which keyframes are visited
+    #[arg(long, value_name = "N", default_value_t = MapSettings::default().seed)]
+    pub seed: u64,
+}
+
+/// Values of `--field`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Field {
+    /// 3D Gaussians
+    #[default]
+    Gaussians,
+}
+
+impl From<&Mapping> for MapSettings {
+    fn from(args: &Mapping) -> Self {
+        Self {
+            blur: args.blur == BlurMode::Auto,
+            virtual_views: args.virtual_views.map(NonZeroUsize::get),
+            max_keyframes: args.max_keyframes.get(),
+            max_gaussians: args.max_gaussians.map(NonZeroUsize::get),
+            time_budget: args.time_budget,
+            seed: args.seed,
+        }
+    }
+}
+
+impl Default for Mapping {
+    fn default() -> Self {
+        Self {
+            field: Field::default(),
+            time_budget: None,
+            blur: BlurMode::default(),
+            virtual_views: None,
+            max_keyframes: default_keyframes(),
+            max_gaussians: None,
+            seed: MapSettings::default().seed,
+        }
+    }
+}
+
+fn default_keyframes() -> NonZeroUsize {
+    NonZeroUsize::new(MapSettings::default().max_keyframes).unwrap_or(NonZeroUsize::MIN)
+}
+
+/// A positive, finite number of seconds.
+fn positive_seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
+    let duration = Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())?;
+    if duration.is_zero() { Err("expected more than 0 seconds".to_owned()) } else { Ok(duration) }
+}

@@ -1,9 +1,14 @@
 //! Order of the Gaussians that are drawn: by depth, ties by index.
 
+use rayon::prelude::*;
+
 use super::project::{Extent, NOT_DRAWN, Projected, Splat};
 
 /// Rank of a Gaussian that is not drawn.
 pub(super) const NO_RANK: u32 = u32::MAX;
+
+/// Ranks per piece of work.
+const RANKS_PER_PIECE: usize = 4096;
 
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
@@ -31,16 +36,18 @@ impl Order {
         let drawn = projected.iter().zip(0..).filter(|(p, _)| p.depth_key != NOT_DRAWN);
         self.keys.extend(drawn.map(|(p, gaussian)| (p.depth_key, gaussian)));
         sort_by_key(&mut self.keys, &mut self.swap);
-        self.splats.clear();
-        self.extents.clear();
         self.rank_from_gaussian.clear();
         self.rank_from_gaussian.resize(projected.len(), NO_RANK);
         for (&(_, gaussian), rank) in self.keys.iter().zip(0..) {
-            let projected = &projected[gaussian as usize];
-            self.splats.push(projected.splat);
-            self.extents.push(projected.extent);
             self.rank_from_gaussian[gaussian as usize] = rank;
         }
+        self.splats.resize(self.keys.len(), Splat::default());
+        self.extents.resize(self.keys.len(), Extent::default());
+        let ranks = self.splats.par_iter_mut().zip(&mut self.extents).zip(&self.keys);
+        ranks.with_min_len(RANKS_PER_PIECE).for_each(|((splat, extent), &(_, gaussian))| {
+            let projected = &projected[gaussian as usize];
+            (*splat, *extent) = (projected.splat, projected.extent);
+        });
     }
 }
 

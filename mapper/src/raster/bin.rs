@@ -233,7 +233,8 @@ mod tests {
         let planes = gaussians.planes().each_ref().map(Vec::as_slice);
         project(Level::new(), &ViewNumbers::new(&view), &planes, 0, &mut projected);
         let (mut order, mut bins) = (Order::default(), Bins::default());
-        order.update(&projected);
+        order.sort(&projected);
+        order.pieces_mut().for_each(|mut piece| piece.gather(&projected));
         let grid = TileGrid::new(SIZE[0], SIZE[1]);
         bins.reset(grid, order.len());
         bins.chunks_mut()

@@ -16,6 +16,7 @@ mod path_metric;
 mod path_step;
 mod schedule;
 mod seeding;
+mod smooth_depth;
 
 pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport};
 pub use display::DisplayCurve;

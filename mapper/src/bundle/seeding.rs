@@ -5,6 +5,7 @@ use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
 use super::observation::Observation;
+use super::smooth_depth::smooth_depth;
 use crate::gaussians::{Gaussian, Gaussians};
 
 /// Side of the largest square that becomes one Gaussian, pixels.
@@ -35,7 +36,8 @@ pub(super) fn seed(
     room: usize,
 ) -> usize {
     let before = gaussians.len();
-    let squares = Squares { seen, inverse_response, world_from_camera, alpha };
+    let depth = smooth_depth(seen);
+    let squares = Squares { seen, depth: &depth, inverse_response, world_from_camera, alpha };
     let region = seen.region;
     for top in (region.top..region.bottom).step_by(LARGEST) {
         for left in (region.left..region.right).step_by(LARGEST) {
@@ -51,6 +53,8 @@ pub(super) fn seed(
 
 struct Squares<'a> {
     seen: &'a Observation,
+    /// Depth without noise, metres.
+    depth: &'a [f32],
     inverse_response: &'a InverseResponse,
     world_from_camera: &'a RigidTransform,
     alpha: &'a [f32],
@@ -103,8 +107,8 @@ impl Squares<'_> {
                 .for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte));
             let grey = bytes.iter().map(|&byte| f32::from(byte)).sum::<f32>() / (3.0 * 255.0);
             (sum, squares, count) = (sum + grey, squares + grey * grey, count + 1.0);
-            if self.seen.depth[pixel] > 0.0 {
-                depths.push(self.seen.depth[pixel]);
+            if self.depth[pixel] > 0.0 {
+                depths.push(self.depth[pixel]);
             }
         }
         let mean = sum / count;

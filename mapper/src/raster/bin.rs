@@ -179,18 +179,19 @@ impl Outline {
             let half = self.extent.half_height * (1.0 - x * x).max(0.0).sqrt();
             self.centre[1] + self.extent.lean * dx + side * half
         };
-        let upper = chord((-self.extent.top).clamp(low, high), -1.0);
-        let lower = chord(self.extent.top.clamp(low, high), 1.0);
+        let upper = chord((-self.extent.top).max(low).min(high), -1.0);
+        let lower = chord(self.extent.top.max(low).min(high), 1.0);
         pixel_range(upper - self.margin, lower + self.margin, grid.height)
     }
 }
 
 /// First pixel centre and end of those from `low` to `high`, of a row or column of `size` pixels.
 fn pixel_range(low: f32, high: f32, size: usize) -> (usize, usize) {
-    // Casts saturate: negative numbers become 0, large ones exceed any size.
-    let first = low.ceil() as usize;
-    let end = ((high.floor() + 1.0) as usize).min(size);
-    (first.min(end), end)
+    // Casts truncate and saturate: negative numbers become 0, large ones exceed any size. Rounding functions would be
+    // calls: the baseline instruction set has none.
+    let first = (low as u32).saturating_add(u32::from(low > low as u32 as f32));
+    let end = if high >= 0.0 { (high as usize).saturating_add(1).min(size) } else { 0 };
+    ((first as usize).min(end), end)
 }
 
 /// The part of the rows within the tile whose first row is `top`.
@@ -232,7 +233,8 @@ mod tests {
         let planes = gaussians.planes().each_ref().map(Vec::as_slice);
         project(Level::new(), &ViewNumbers::new(&view), &planes, 0, &mut projected);
         let (mut order, mut bins) = (Order::default(), Bins::default());
-        order.update(&projected);
+        order.sort(&projected);
+        order.pieces_mut().for_each(|mut piece| piece.gather(&projected));
         let grid = TileGrid::new(SIZE[0], SIZE[1]);
         bins.reset(grid, order.len());
         bins.chunks_mut()

@@ -1,5 +1,7 @@
 //! The stages in order, each over all threads of the current pool.
 
+use core::ops::Range;
+
 use mba_tracker::simd::Level;
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
@@ -7,7 +9,7 @@ use rayon::prelude::*;
 use super::backward::{SplatSums, TileGradient, backward};
 use super::bin::Bins;
 use super::forward::{TileCounts, TilePixels, TileSplats, composite};
-use super::image::{RasterImage, ViewTiles, load_gradient, store_mean};
+use super::image::{RasterImage, TileRows, ViewTiles, load_gradient, store_mean};
 use super::lanes::ViewNumbers;
 use super::order::{NO_RANK, Order};
 use super::pose::ViewGradient;
@@ -217,7 +219,9 @@ impl Rasterizer {
 
     /// Second stage of [`Self::forward`]: sorts what is drawn by depth.
     pub fn order(&self, scratch: &mut RasterScratch) {
-        scratch.order.update(&scratch.projected);
+        scratch.order.sort(&scratch.projected);
+        let pieces = scratch.order.pieces_mut().par_bridge();
+        pieces.for_each(|mut piece| piece.gather(&scratch.projected));
     }
 
     /// Third stage of [`Self::forward`]: lists the splats of every tile.
@@ -242,14 +246,11 @@ impl Rasterizer {
 
     /// The mean colour of views of one size, with depth and alpha of the one in the middle.
     pub(crate) fn store_mean(&self, views: &[RasterScratch], image: &mut RasterImage) {
-        let Some(mid) = views.get(views.len() / 2) else {
+        let Some(grid) = views.first().map(|view| view.bins.grid) else {
             return;
         };
-        let grid = &mid.bins.grid;
         image.resize(grid.width, grid.height);
-        let tiles =
-            |view: usize| ViewTiles { tiles: &views[view].tiles, background: &views[view].background };
-        store_mean(&tiles, views.len(), grid, 0..grid.down, image.tile_rows());
+        store_rows(views, 0..grid.down, image.tile_rows());
     }
 
     fn composite_tiles<const DEPTH: bool>(&self, scratch: &mut RasterScratch) {
@@ -276,7 +277,7 @@ impl Rasterizer {
     }
 
     /// Replays a range of tiles, whose lists have the length of `sums` together.
-    fn replay_tiles(&self, input: &Replay, tiles: core::ops::Range<usize>, sums: &mut [SplatSums]) {
+    fn replay_tiles(&self, input: &Replay, tiles: Range<usize>, sums: &mut [SplatSums]) {
         if tiles.len() > 1 {
             let middle = tiles.start + tiles.len() / 2;
             let start = &input.scratch.bins.tile_start;
@@ -360,6 +361,22 @@ struct Replay<'a> {
 
 fn tile_splats<'a>(order: &'a Order, bins: &'a Bins, tile: usize) -> TileSplats<'a> {
     TileSplats { splats: &order.splats, list: bins.list(tile), origin: bins.grid.origin(tile) }
+}
+
+/// Stores the mean of views in rows of tiles.
+fn store_rows(views: &[RasterScratch], down: Range<usize>, mut rows: TileRows) {
+    if down.len() > 1 {
+        let middle = down.start + down.len() / 2;
+        let (upper, lower) = rows.split_at(middle - down.start);
+        rayon::join(
+            || store_rows(views, down.start..middle, upper),
+            || store_rows(views, middle..down.end, lower),
+        );
+    } else if !down.is_empty() {
+        let tiles =
+            |view: usize| ViewTiles { tiles: &views[view].tiles, background: &views[view].background };
+        store_mean(&tiles, views.len(), &views[0].bins.grid, down.start, &mut rows);
+    }
 }
 
 fn slices(gaussians: &Gaussians) -> [&[f32]; PARAMETERS] {

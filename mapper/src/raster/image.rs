@@ -1,7 +1,5 @@
 //! Rendered images, and gradients by them.
 
-use core::ops::Range;
-
 use super::backward::{GradientCell, TileGradient};
 use super::driver::ViewShare;
 use super::forward::{PixelCell, TilePixels};
@@ -114,29 +112,20 @@ pub(super) struct ViewTiles<'a> {
     pub(super) background: &'a [f32; 3],
 }
 
-/// Stores the mean of `count` views in the rows of tiles `down`, with depth and alpha of the view in the middle.
+/// Stores the mean of `count` views in row `down` of the tiles, with depth and alpha of the view in the middle.
 pub(super) fn store_mean<'a>(
-    view: &(impl Fn(usize) -> ViewTiles<'a> + Sync),
+    view: &impl Fn(usize) -> ViewTiles<'a>,
     count: usize,
     grid: &TileGrid,
-    down: Range<usize>,
-    mut rows: TileRows,
+    down: usize,
+    rows: &mut TileRows,
 ) {
-    if down.len() > 1 {
-        let middle = down.start + down.len() / 2;
-        let (upper, lower) = rows.split_at(middle - down.start);
-        rayon::join(
-            || store_mean(view, count, grid, down.start..middle, upper),
-            || store_mean(view, count, grid, middle..down.end, lower),
-        );
-    } else if !down.is_empty() {
-        rows.store(grid, |across, block, cell| {
-            let tile = down.start * grid.across + across;
-            let mid = &view(count / 2).tiles[tile].blocks[block][cell];
-            let [red, green, blue] = mean_colour(view, count, |tiles| &tiles[tile].blocks[block][cell]);
-            [red, green, blue, mid.depth, mid.transmittance.map(|left| 1.0 - left.abs())]
-        });
-    }
+    rows.store(grid, |across, block, cell| {
+        let tile = down * grid.across + across;
+        let mid = &view(count / 2).tiles[tile].blocks[block][cell];
+        let [red, green, blue] = mean_colour(view, count, |tiles| &tiles[tile].blocks[block][cell]);
+        [red, green, blue, mid.depth, mid.transmittance.map(|left| 1.0 - left.abs())]
+    });
 }
 
 /// The mean colour of a cell over the views.

@@ -157,8 +157,13 @@ impl<S: Simd> Lanes<S> {
         );
 
         // A sum of numbers is finite only if all are: infinities and NaN fail every comparison below.
-        let input = p.iter().fold(one, |sum, &value| sum + value * 0.0);
-        let output = whitening.iter().chain(&centre).fold(determinant * 0.0, |sum, &value| sum + value * 0.0);
+        let (mut input, mut output) = (one, determinant * 0.0);
+        for &value in p {
+            input += value * 0.0;
+        }
+        for value in [whitening[0], whitening[1], whitening[2], centre[0], centre[1]] {
+            output += value * 0.0;
+        }
         let sane = (input + output).simd_eq(1.0);
         let depth = x_camera[2].simd_gt(NEAR_PLANE as f32) & x_camera[2].simd_lt(FAR_PLANE as f32);
         let brightest = colour[0].abs().max(colour[1].abs()).max(colour[2].abs());

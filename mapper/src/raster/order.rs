@@ -5,6 +5,9 @@ use super::project::{Extent, NOT_DRAWN, Projected, Splat};
 /// Rank of a Gaussian that is not drawn.
 pub(super) const NO_RANK: u32 = u32::MAX;
 
+/// Ranks per piece of work.
+const RANKS_PER_PIECE: usize = 4096;
+
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
@@ -19,27 +22,50 @@ pub(super) struct Order {
     swap: Vec<(u32, u32)>,
 }
 
+/// A range of ranks.
+pub(super) struct RankPiece<'a> {
+    splats: &'a mut [Splat],
+    extents: &'a mut [Extent],
+    keys: &'a [(u32, u32)],
+}
+
 impl Order {
     /// Number of Gaussians that are drawn.
     pub(super) fn len(&self) -> usize {
         self.splats.len()
     }
 
-    /// Sorts what was projected.
-    pub(super) fn update(&mut self, projected: &[Projected]) {
+    /// Sorts what was projected; the pieces are then to be filled.
+    pub(super) fn sort(&mut self, projected: &[Projected]) {
         self.keys.clear();
         let drawn = projected.iter().zip(0..).filter(|(p, _)| p.depth_key != NOT_DRAWN);
         self.keys.extend(drawn.map(|(p, gaussian)| (p.depth_key, gaussian)));
         sort_by_key(&mut self.keys, &mut self.swap);
-        self.splats.clear();
-        self.extents.clear();
         self.rank_from_gaussian.clear();
         self.rank_from_gaussian.resize(projected.len(), NO_RANK);
         for (&(_, gaussian), rank) in self.keys.iter().zip(0..) {
-            let projected = &projected[gaussian as usize];
-            self.splats.push(projected.splat);
-            self.extents.push(projected.extent);
             self.rank_from_gaussian[gaussian as usize] = rank;
+        }
+        self.splats.resize(self.keys.len(), Splat::default());
+        self.extents.resize(self.keys.len(), Extent::default());
+    }
+
+    /// Pieces of ranks, of which what was projected is then to be gathered.
+    pub(super) fn pieces_mut(&mut self) -> impl Iterator<Item = RankPiece<'_>> {
+        let splats = self.splats.chunks_mut(RANKS_PER_PIECE);
+        let outputs = splats.zip(self.extents.chunks_mut(RANKS_PER_PIECE));
+        let keys = self.keys.chunks(RANKS_PER_PIECE);
+        outputs.zip(keys).map(|((splats, extents), keys)| RankPiece { splats, extents, keys })
+    }
+}
+
+impl RankPiece<'_> {
+    /// Copies what was projected.
+    pub(super) fn gather(&mut self, projected: &[Projected]) {
+        let outputs = self.splats.iter_mut().zip(self.extents.iter_mut());
+        for ((splat, extent), &(_, gaussian)) in outputs.zip(self.keys) {
+            let projected = &projected[gaussian as usize];
+            (*splat, *extent) = (projected.splat, projected.extent);
         }
     }
 }

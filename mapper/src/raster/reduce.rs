@@ -10,7 +10,7 @@ pub(super) const SUMS: usize = 10;
 
 /// The sums of eight Gaussians over all tiles, in the order of the tiles; zero for those that are not drawn.
 /// Returns whether any is drawn.
-#[inline]
+#[inline(always)]
 pub(super) fn reduce(ranks: &[u32], bins: &Bins, sums: &[SplatSums], out: &mut [[f32; LANES]; SUMS]) -> bool {
     *out = [[0.0; LANES]; SUMS];
     let mut any = false;

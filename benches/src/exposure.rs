@@ -1,0 +1,50 @@
+//! The furnished room, seen by a camera that moves while its shutter is open.
+
+use mba_mapper::exposure::{ExposureGradient, ExposureRenderer, ExposureScratch};
+use mba_mapper::raster::RasterImage;
+use mba_tracker::simd::Level;
+use mba_tracker::trajectory::ExposureTrajectory;
+use nalgebra::Vector6;
+
+use crate::raster::RasterInput;
+
+/// Centimetres and a degree of motion: about twelve pixels of blur.
+const MOTION: [f64; 6] = [0.01, 0.02, 0.0, 0.02, 0.015, 0.0];
+
+/// A map, an exposure of it, and everything that rendering it needs.
+pub struct ExposureInput {
+    room: RasterInput,
+    path: ExposureTrajectory,
+    renderer: ExposureRenderer,
+    scratch: ExposureScratch,
+    image: RasterImage,
+}
+
+impl ExposureInput {
+    /// The room of [`RasterInput::room`].
+    #[must_use]
+    pub fn room(level: Level, count: usize) -> Self {
+        let room = RasterInput::room(level, count);
+        let motion = Vector6::from(MOTION);
+        Self {
+            path: ExposureTrajectory::from_mid_and_motion(&room.view.world_from_camera, &motion),
+            renderer: ExposureRenderer::new(level),
+            scratch: ExposureScratch::default(),
+            image: RasterImage::default(),
+            room,
+        }
+    }
+
+    /// Renders the exposure.
+    pub fn forward(&mut self, views: usize) {
+        let Self { room, path, renderer, scratch, image } = self;
+        let background = room.view.background;
+        renderer.forward(&room.gaussians, &room.view.camera, path, views, background, scratch, image);
+    }
+
+    /// Takes the gradient back to map and poses.
+    pub fn backward(&mut self) -> ExposureGradient {
+        let RasterInput { gaussians, by_image, gradients, .. } = &mut self.room;
+        self.renderer.backward(gaussians, by_image, &mut self.scratch, gradients)
+    }
+}

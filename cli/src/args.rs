@@ -312,6 +312,9 @@ pub struct Render {
     /// Focal length in pixels, with the principal point in the middle; default: the camera of the data set
     #[arg(long, value_name = "PX", value_parser = non_negative)]
     pub focal: Option<f64>,
+    /// Colours from the surroundings where the map has nothing, or black
+    #[arg(long, value_enum, default_value_t)]
+    pub fill: Switch,
     /// What the images are named by
     #[arg(long, value_enum, default_value_t)]
     pub names: ViewNames,

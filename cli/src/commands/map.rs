@@ -61,7 +61,8 @@ pub fn map_into(
 
 fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
     // The run may be looked at from another directory.
-    let absolute = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string();
+    let absolute =
+        |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string();
     let values = json!({
         "field": "gaussians",
         "trajectory": absolute(&run.folder),
@@ -89,7 +90,9 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
         }
         MapError::NoKeyframe(_) => "look at frames.csv of the run and at `mba info DATASET`",
         MapError::NoDepth => "a map needs depth images; see `mba info DATASET`",
-        MapError::Checkpoint(_) => "start without --resume, or with the inputs and options of the stopped run",
+        MapError::Checkpoint(_) => {
+            "start without --resume, or with the inputs and options of the stopped run"
+        }
         MapError::Continuity(_) => "track the data set again",
         MapError::Run(RunError::DiskFull { .. }) => return Err(error.into()),
         _ => "name a folder for --out that can be created or written",

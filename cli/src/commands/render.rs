@@ -6,13 +6,13 @@ use std::time::Instant;
 
 use mba_mapper::evaluation::{PoseAlignment, align_poses};
 use mba_mapper::gaussians::Gaussians;
-use mba_mapper::rendering::{RenderedView, ViewRenderer};
+use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
 use mba_mapper::run::{FrameStatus, MAP_FILE, Run, RunCamera, Spread, mid_pose};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use serde::Serialize;
 
 use super::open;
-use crate::args::{Render, ViewNames};
+use crate::args::{Render, Switch, ViewNames};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
 use crate::report::table::{pairs, percent};
@@ -125,11 +125,12 @@ fn render_all(
     let mut renderer =
         ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
     let progress = console.progress(poses.len(), "rendering");
+    let behind = if args.fill == Switch::On { Behind::Surroundings } else { Behind::Black };
     let mut times = Vec::with_capacity(poses.len());
     let mut solid = 0.0;
     for (index, pose) in poses.iter().enumerate() {
         let start = Instant::now();
-        let view = renderer.render(&pose.world_from_camera);
+        let view = renderer.render(&pose.world_from_camera, behind);
         times.push(1e3 * start.elapsed().as_secs_f64());
         solid += view.solid / poses.len() as f64;
         write(&view, &args.out, &depth_folder, &name(args.names, index, pose))?;

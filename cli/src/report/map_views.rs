@@ -5,7 +5,7 @@ use std::fs;
 use image::RgbImage;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::gaussians::{Gaussians, read_ply};
-use mba_mapper::rendering::ViewRenderer;
+use mba_mapper::rendering::{Behind, ViewRenderer};
 use mba_mapper::run::{MAP_FILE, Run, RunCamera};
 
 use super::html::escape;
@@ -47,7 +47,7 @@ fn views(run: &Run, map: &Gaussians, camera: &RunCamera) -> anyhow::Result<Strin
         ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
     let mut html = String::new();
     for index in shown_frames(run) {
-        let view = renderer.render(&run.exposures[index].mid);
+        let view = renderer.render(&run.exposures[index].mid, Behind::Surroundings);
         let [width, height] = view.size.map(|side| side as u32);
         let Some(image) = RgbImage::from_raw(width, height, view.rgb) else { continue };
         html.push_str(&format!(

@@ -54,6 +54,62 @@ pub(super) struct Moments {
     pub(super) updates: Vec<u32>,
 }
 
+/// A range of everything that a step touches.
+struct Piece<'a> {
+    /// First Gaussian of the range.
+    start: usize,
+    values: PlanesMut<'a>,
+    first: PlanesMut<'a>,
+    second: PlanesMut<'a>,
+    updates: &'a mut [u32],
+}
+
+impl<'a> Piece<'a> {
+    /// The first Gaussians of the range, and the rest.
+    fn split(self) -> (Self, Self) {
+        let (values, values_rest) = self.values.split_at(PIECE);
+        let (first, first_rest) = self.first.split_at(PIECE);
+        let (second, second_rest) = self.second.split_at(PIECE);
+        let (updates, updates_rest) = self.updates.split_at_mut(values.len());
+        let start = self.start + values.len();
+        let rest = Self {
+            start,
+            values: values_rest,
+            first: first_rest,
+            second: second_rest,
+            updates: updates_rest,
+        };
+        (Self { start: self.start, values, first, second, updates }, rest)
+    }
+
+    /// Moves the Gaussians of the range that are drawn.
+    fn step(mut self, gradient: &Gaussians, drawn: &[bool], lengths: &StepLengths) {
+        for i in 0..self.values.len() {
+            let index = self.start + i;
+            if drawn.get(index).is_some_and(|drawn| *drawn) {
+                let by = core::array::from_fn(|k| gradient.planes()[k][index]);
+                self.step_one(i, &by, lengths);
+            }
+        }
+    }
+
+    fn step_one(&mut self, i: usize, gradient: &[f32; PARAMETERS], lengths: &StepLengths) {
+        self.updates[i] += 1;
+        let updates = self.updates[i].min(10_000) as i32;
+        let corrections = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powi(updates)));
+        let units = units(&self.values, i, lengths);
+        let squares = squares(gradient);
+        for (k, (unit, square)) in units.into_iter().zip(squares).enumerate() {
+            let (first, second) = (&mut self.first.planes[k][i], &mut self.second.planes[k][i]);
+            *first = BETA_1 * *first + (1.0 - BETA_1) * gradient[k];
+            *second = BETA_2 * *second + (1.0 - BETA_2) * square;
+            let scale = (*second * corrections[1]).sqrt() + EPSILON;
+            self.values.planes[k][i] -= unit * *first * corrections[0] / scale;
+        }
+        normalise(&mut self.values, i);
+    }
+}
+
 /// Moves the Gaussians that are marked in `drawn` one step against `gradient`.
 pub(super) fn step(
     gaussians: &mut Gaussians,
@@ -62,72 +118,44 @@ pub(super) fn step(
     lengths: &StepLengths,
     moments: &mut Moments,
 ) {
+    let mut rest = Piece {
+        start: 0,
+        values: gaussians.planes_mut(),
+        first: moments.first.planes_mut(),
+        second: moments.second.planes_mut(),
+        updates: &mut moments.updates,
+    };
     let mut pieces = Vec::new();
-    let mut rest = (gaussians.planes_mut(), moments.first.planes_mut(), moments.second.planes_mut());
-    let mut updates = moments.updates.as_mut_slice();
-    let mut start = 0;
-    while !rest.0.is_empty() {
-        let (values, values_rest) = rest.0.split_at(PIECE);
-        let (first, first_rest) = rest.1.split_at(PIECE);
-        let (second, second_rest) = rest.2.split_at(PIECE);
-        let (counts, counts_rest) = updates.split_at_mut(values.len());
-        let len = values.len();
-        pieces.push((start, values, first, second, counts));
-        rest = (values_rest, first_rest, second_rest);
-        updates = counts_rest;
-        start += len;
+    while !rest.values.is_empty() {
+        let (piece, others) = rest.split();
+        pieces.push(piece);
+        rest = others;
     }
-    pieces.into_par_iter().for_each(|(start, mut values, mut first, mut second, counts)| {
-        step_piece(start, &mut values, gradient, drawn, lengths, &mut first, &mut second, counts);
-    });
+    pieces.into_par_iter().for_each(|piece| piece.step(gradient, drawn, lengths));
 }
 
-#[expect(clippy::too_many_arguments, reason = "one range of everything that a step touches")]
-fn step_piece(
-    start: usize,
-    values: &mut PlanesMut<'_>,
-    gradient: &Gaussians,
-    drawn: &[bool],
-    lengths: &StepLengths,
-    first: &mut PlanesMut<'_>,
-    second: &mut PlanesMut<'_>,
-    counts: &mut [u32],
-) {
-    for i in 0..values.len() {
-        if !drawn.get(start + i).copied().unwrap_or(false) {
-            continue;
-        }
-        counts[i] += 1;
-        let t = counts[i].min(10_000) as i32;
-        let correction_1 = 1.0 / (1.0 - BETA_1.powi(t));
-        let correction_2 = 1.0 / (1.0 - BETA_2.powi(t));
-        let unit = units(values, i, lengths);
-        for k in 0..PARAMETERS {
-            let g = gradient.planes()[k][start + i];
-            let m = &mut first.planes[k][i];
-            let v = &mut second.planes[k][i];
-            *m = BETA_1 * *m + (1.0 - BETA_1) * g;
-            *v = BETA_2 * *v + (1.0 - BETA_2) * g * g;
-            let step = unit[k] * (*m * correction_1) / ((*v * correction_2).sqrt() + EPSILON);
-            values.planes[k][i] -= step;
-        }
-        normalise(values, i);
-    }
+/// Squares of the gradient that steps are measured by. The three of a centre share one: views hardly tell how far away a
+/// Gaussian is, and with a scale of its own every bit of noise would move it along the line of sight, where whatever
+/// comes nearer hides the rest.
+fn squares(gradient: &[f32; PARAMETERS]) -> [f32; PARAMETERS] {
+    let mut squares = gradient.map(|value| value * value);
+    let of_mean = squares[MEAN..MEAN + 3].iter().sum::<f32>() / 3.0;
+    squares[MEAN..MEAN + 3].fill(of_mean);
+    squares
 }
 
 /// Length of a step of every parameter of Gaussian `i`.
 fn units(values: &PlanesMut<'_>, i: usize, lengths: &StepLengths) -> [f32; PARAMETERS] {
     let plane = |k: usize| values.planes[k][i];
     let size = ((plane(LOG_SCALE) + plane(LOG_SCALE + 1) + plane(LOG_SCALE + 2)) / 3.0).exp();
+    // Light is the square of the display value, roughly; the slope of a square is twice its root.
+    let colour = |channel: usize| lengths.colour * (2.0 * plane(COLOUR + channel).max(0.0).sqrt() + 0.02);
     let mut unit = [0.0; PARAMETERS];
     unit[MEAN..MEAN + 3].fill(lengths.mean * size);
     unit[LOG_SCALE..LOG_SCALE + 3].fill(lengths.log_scale);
     unit[ROTATION..ROTATION + 4].fill(lengths.rotation);
     unit[OPACITY_LOGIT] = lengths.opacity;
-    for channel in COLOUR..COLOUR + 3 {
-        // Light is the square of the display value, roughly; the slope of a square is twice its root.
-        unit[channel] = lengths.colour * (2.0 * plane(channel).max(0.0).sqrt() + 0.02);
-    }
+    unit[COLOUR..COLOUR + 3].copy_from_slice(&[colour(0), colour(1), colour(2)]);
     unit
 }
 

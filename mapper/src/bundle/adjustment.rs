@@ -14,7 +14,7 @@ use super::observation::{Observation, ObservationPyramid, Sensor};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
 use super::schedule::{Schedule, StepPlan};
-use super::seeding;
+use super::seeding::{self, DepthSource};
 use crate::gaussians::Gaussians;
 use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
 
@@ -82,6 +82,7 @@ pub struct BundleAdjustment {
     settings: BundleSettings,
     schedule: Schedule,
     sensor: Sensor,
+    level: Level,
     engine: Engine,
     /// Order of the visits of the current round, and which round that is.
     round: (usize, Vec<usize>),
@@ -121,7 +122,7 @@ impl BundleAdjustment {
             steps: 0,
             position: 0.0,
         };
-        Self { state, keyframes, settings, schedule, sensor, engine, round: (usize::MAX, Vec::new()) }
+        Self { state, keyframes, settings, schedule, sensor, level, engine, round: (usize::MAX, Vec::new()) }
     }
 
     /// The keyframes.
@@ -136,22 +137,25 @@ impl BundleAdjustment {
         &self.schedule
     }
 
-    /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover.
+    /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,
+    /// once more, surfaces that no keyframe has a depth of.
     pub fn seed(&mut self) {
         let camera = self.sensor.camera;
         let blur = |k: &usize| self.state.frames[*k].blur_px(&camera, self.keyframes[*k].depth);
         let mut order: Vec<usize> = (0..self.keyframes.len()).collect();
         order.sort_by(|a, b| blur(a).total_cmp(&blur(b)));
-        let rasterizer = Rasterizer::new(Level::new());
+        let rasterizer = Rasterizer::new(self.level);
         let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
-        for k in order {
-            let seen = self.keyframes[k].observation.level(0);
-            let world_from_camera = self.state.frames[k].path.mid();
-            let view = RasterView { camera: seen.camera, world_from_camera, background: [0.0; 3] };
-            rasterizer.forward(&self.state.gaussians, &view, &mut scratch, &mut image);
-            let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
-            let response = &self.sensor.inverse_response;
-            seeding::seed(&mut self.state.gaussians, seen, response, &world_from_camera, &image.alpha, room);
+        for source in [DepthSource::Measured, DepthSource::Completed] {
+            for &k in &order {
+                let seen = self.keyframes[k].observation.level(0);
+                let world_from_camera = self.state.frames[k].path.mid();
+                let view = RasterView { camera: seen.camera, world_from_camera, background: [0.0; 3] };
+                rasterizer.forward(&self.state.gaussians, &view, &mut scratch, &mut image);
+                let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
+                let (map, response) = (&mut self.state.gaussians, &self.sensor.inverse_response);
+                seeding::seed(map, seen, response, &world_from_camera, &image.alpha, source, room);
+            }
         }
         density::resize(&mut self.state.moments, self.state.gaussians.len());
         self.reorder();
@@ -194,12 +198,7 @@ impl BundleAdjustment {
     }
 
     /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution.
-    pub fn fit_frame(
-        &mut self,
-        unmapped: &Keyframe,
-        frame: &mut FrameState,
-        count: usize,
-    ) {
+    pub fn fit_frame(&mut self, unmapped: &Keyframe, frame: &mut FrameState, count: usize) {
         let plan = StepPlan { level: 1, spacing: 2.0, ..self.schedule.plan(0.1, false) };
         let seen = unmapped.observation.level(plan.level);
         for k in 0..count {

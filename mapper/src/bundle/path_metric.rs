@@ -11,7 +11,7 @@ const STRIDE: usize = 2;
 
 /// A move that is seen this much less than the typical one counts as seen that much, as a ratio of squares: nobody
 /// should go far along what hardly shows.
-const FAINTEST: f64 = 1e-3;
+const FAINTEST: f64 = 0.1;
 
 /// Coordinates of the movements of one camera in which all directions move the picture by the same amount.
 ///
@@ -21,6 +21,7 @@ const FAINTEST: f64 = 1e-3;
 pub struct PathMetric {
     /// Tangent, translation in the camera frame, that a unit along each coordinate is.
     tangent_from_unit: Matrix6<f64>,
+    unit_from_tangent: Matrix6<f64>,
 }
 
 impl PathMetric {
@@ -42,19 +43,29 @@ impl PathMetric {
                 let [along, down] = gradient(seen, x, y);
                 let measured = f64::from(seen.depth[y * camera.width + x]);
                 let depth = if measured > 0.0 { measured } else { typical_depth };
-                let row = movement(camera, [x as f64, y as f64], depth, [along, down]).component_mul(&scale.transpose());
+                let row = movement(camera, [x as f64, y as f64], depth, [along, down])
+                    .component_mul(&scale.transpose());
                 information += row.transpose() * row;
                 weight += along * along + down * down;
             }
         }
-        let unscaled = root_of_inverse(&(information / f64::max(weight, 1e-12)));
-        Self { tangent_from_unit: Matrix6::from_diagonal(&scale) * unscaled }
+        let [unscaled, inverse] = roots(&(information / f64::max(weight, 1e-12)));
+        Self {
+            tangent_from_unit: Matrix6::from_diagonal(&scale) * unscaled,
+            unit_from_tangent: inverse * Matrix6::from_diagonal(&scale.map(|length| 1.0 / length)),
+        }
     }
 
     /// The tangent, translation in the world, of a move given in units.
     #[must_use]
     pub fn tangent(&self, path: &ExposurePath, units: &Vector6<f64>) -> Vector6<f64> {
         turned(&path.mid(), &(self.tangent_from_unit * units))
+    }
+
+    /// How many units a tangent is, translation in the world.
+    #[must_use]
+    pub fn units(&self, path: &ExposurePath, tangent: &Vector6<f64>) -> Vector6<f64> {
+        self.unit_from_tangent * turned(&path.mid().inverse(), tangent)
     }
 
     /// The gradient by units from that by the tangent.
@@ -82,7 +93,12 @@ fn gradient(seen: &Observation, x: usize, y: usize) -> [f64; 2] {
 
 /// Change of the value at a pixel by the tangent of the camera: `x_c = R^T (x - p)`, so `dx_c/dt = -1` with the
 /// translation in the camera frame and `dx_c/dr = [x_c]x`.
-fn movement(camera: &PinholeCamera, [u, v]: [f64; 2], depth: f64, [along, down]: [f64; 2]) -> RowVector6<f64> {
+fn movement(
+    camera: &PinholeCamera,
+    [u, v]: [f64; 2],
+    depth: f64,
+    [along, down]: [f64; 2],
+) -> RowVector6<f64> {
     let ray = camera.ray(u, v);
     let by_x = along * camera.fx / depth;
     let by_y = down * camera.fy / depth;
@@ -92,13 +108,14 @@ fn movement(camera: &PinholeCamera, [u, v]: [f64; 2], depth: f64, [along, down]:
     RowVector6::new(-by_point.x, -by_point.y, -by_point.z, by_turn.x, by_turn.y, by_turn.z)
 }
 
-/// A matrix C with `C^T A C` the identity, but for directions that A has next to nothing of.
-fn root_of_inverse(a: &Matrix6<f64>) -> Matrix6<f64> {
+/// A matrix C with `C^T A C` the identity, but for directions that A has next to nothing of, and its inverse.
+fn roots(a: &Matrix6<f64>) -> [Matrix6<f64>; 2] {
     let typical = a.trace() / 6.0;
     if !(typical > 0.0 && typical.is_finite()) {
-        return Matrix6::identity();
+        return [Matrix6::identity(); 2];
     }
     let eigen = a.symmetric_eigen();
-    let stretch = eigen.eigenvalues.map(|value| 1.0 / value.max(FAINTEST * typical).sqrt());
-    eigen.eigenvectors * Matrix6::from_diagonal(&stretch)
+    let root = eigen.eigenvalues.map(|value| value.max(FAINTEST * typical).sqrt());
+    let stretch = Matrix6::from_diagonal(&root.map(|root| 1.0 / root));
+    [eigen.eigenvectors * stretch, Matrix6::from_diagonal(&root) * eigen.eigenvectors.transpose()]
 }

@@ -1,5 +1,6 @@
 //! Steps of the path of an exposure.
 
+use mba_tracker::geometry::RigidTransform;
 use nalgebra::{SMatrix, SVector, Vector6};
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,8 @@ const BETA_2: f64 = 0.99;
 /// Cost of one standard deviation from the predicted motion, in units of the loss: far below what a blurred picture
 /// says about its motion, above the noise of a sharp one, which says nothing.
 const PRIOR_COST: f64 = 2e-5;
+/// Cost of a middle one pixel from where it was tracked, twice, in units of the loss.
+const MIDDLE_COST: f64 = 1e-3;
 /// Standard deviation of the bow, pixels: hands turn round within few exposures only.
 const BOW_PX: f64 = 2.0;
 
@@ -43,8 +46,11 @@ impl Default for PathMoments {
 }
 
 /// What is known of a path besides its picture.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPrior {
+    /// Where the tracker found the middle of the linear motion, `world_from_camera`. It measured every frame against depth;
+    /// without it the scale of map and path together, which no picture shows, would drift.
+    pub middle: RigidTransform,
     /// Motion that the neighbours in time suggest.
     pub motion: Option<MotionPrediction>,
 }
@@ -78,6 +84,9 @@ impl PathMoments {
         let typical = (self.second * corrections[1]).sqrt() + 1e-20;
         let prior_motion = metric.by_units(path, &prior.gradient_by_motion(path));
         let prior_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
+        let drift = metric.units(path, &prior.middle.tangent_to(&path.ends.mid()));
+        let prior_middle = drift * MIDDLE_COST;
+        let middle = middle + prior_middle;
         let gradients = [middle, motion + capped(prior_motion, typical), bow + capped(prior_bow, typical)];
         let scale = -step.pixels * corrections[0] / typical;
         let mut moves = [Vector6::zeros(); 3];

@@ -52,8 +52,9 @@ pub struct Schedule {
 const HOLD: f64 = 0.25;
 /// Length of the last step, relative to the first.
 const FINAL_LENGTH: f64 = 0.03;
-/// Paths and gains rest until the map has taken shape.
-const PATHS_FROM: f64 = 0.1;
+/// Paths and gains rest until the map has taken shape: one that has not pulls all paths together, and what a chain of
+/// frames has drifted takes long to come back.
+const PATHS_FROM: f64 = 0.3;
 /// The density changes this often while it changes.
 const DENSITY_CHANGES: f64 = 16.0;
 /// Position from which the density is final.
@@ -61,18 +62,18 @@ const DENSITY_UNTIL: f64 = 0.6;
 
 const LENGTHS: StepLengths =
     StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
-const PATH_PIXELS: f64 = 0.04;
+const PATH_PIXELS: f64 = 0.05;
 const LOG_GAIN: f64 = 2e-3;
-const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 0.1, alpha: 0.01 };
+const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, alpha: 0.01 };
 
 impl Schedule {
     /// The schedule for a number of keyframes: every one is visited about as often, whatever their number.
     #[must_use]
     pub fn new(keyframes: usize) -> Self {
         let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
-        let coarse = Stage { steps: visits(10, 300), time_share: 0.15, level: 1, spacing: 3.0, max_views: 9 };
-        let fine = Stage { steps: visits(12, 500), time_share: 0.65, level: 0, spacing: 3.0, max_views: 11 };
-        let last = Stage { steps: visits(3, 100), time_share: 0.2, level: 0, spacing: 2.0, max_views: 21 };
+        let coarse = Stage { steps: visits(8, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 9 };
+        let fine = Stage { steps: visits(18, 600), time_share: 0.65, level: 0, spacing: 4.0, max_views: 11 };
+        let last = Stage { steps: visits(4, 100), time_share: 0.25, level: 0, spacing: 3.0, max_views: 21 };
         Self { stages: vec![coarse, fine, last] }
     }
 
@@ -111,9 +112,9 @@ impl Schedule {
             spacing: stage.spacing,
             max_views: stage.max_views,
             lengths: LENGTHS.scaled(shrink as f32),
-            path_pixels: std::env::var("LP").map_or(PATH_PIXELS, |v| v.parse().unwrap()) * paths,
+            path_pixels: PATH_PIXELS * paths,
             log_gain: LOG_GAIN * paths,
-            weights: LossWeights { depth: std::env::var("WD").map_or(WEIGHTS.depth, |v| v.parse().unwrap()), alpha: std::env::var("WA").map_or(WEIGHTS.alpha, |v| v.parse().unwrap()), ..WEIGHTS },
+            weights: WEIGHTS,
         }
     }
 

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::observation::Observation;
 use super::smooth_depth::smooth_depth;
 use crate::gaussians::{Gaussian, Gaussians};
+use crate::infill;
 
 /// Side of the largest square that becomes one Gaussian, pixels.
 const LARGEST: usize = 16;
@@ -23,20 +24,46 @@ const OPACITY: f32 = 0.9;
 /// A pixel is covered where the map's alpha is larger.
 const COVERED: f32 = 0.5;
 
+/// Where the depth of new Gaussians comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DepthSource {
+    /// Pixels with a depth only.
+    Measured,
+    /// Pixels without a depth get one from their surroundings.
+    Completed,
+}
+
+/// Depth without noise and, if asked for, without holes, metres.
+fn depth_to_seed(seen: &Observation, source: DepthSource) -> Vec<f32> {
+    let mut depth = smooth_depth(seen);
+    if source == DepthSource::Completed {
+        let known: Vec<f32> = depth.iter().map(|z| if *z > 0.0 { 1.0 } else { 0.0 }).collect();
+        // Inverse depth is what is linear in pixels on a plane.
+        let mut inverse: Vec<f32> = depth.iter().map(|z| 1.0 / z).collect();
+        infill::fill(seen.camera.width, &mut inverse, &known);
+        for (depth, inverse) in depth.iter_mut().zip(inverse) {
+            *depth = if inverse > 0.0 { 1.0 / inverse } else { 0.0 };
+        }
+    }
+    depth
+}
+
 /// Appends Gaussians on the surface that `seen` shows from `world_from_camera`, one per square that is uniform in
 /// colour and depth, unless the middle of the square is covered according to `alpha` (row by row, as large as `seen`).
 ///
 /// Adds at most `room` and returns how many.
+#[expect(clippy::too_many_arguments, reason = "what is seen, from where, and what is there already")]
 pub(super) fn seed(
     gaussians: &mut Gaussians,
     seen: &Observation,
     inverse_response: &InverseResponse,
     world_from_camera: &RigidTransform,
     alpha: &[f32],
+    source: DepthSource,
     room: usize,
 ) -> usize {
     let before = gaussians.len();
-    let depth = smooth_depth(seen);
+    let depth = depth_to_seed(seen, source);
     let squares = Squares { seen, depth: &depth, inverse_response, world_from_camera, alpha };
     let region = seen.region;
     for top in (region.top..region.bottom).step_by(LARGEST) {

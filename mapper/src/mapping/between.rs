@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 
 use super::MapSettings;
 use super::prepare::{Frames, observation, sensor};
-use crate::bundle::{BundleAdjustment, Keyframe};
+use crate::bundle::{BundleAdjustment, Keyframe, PathPrior};
 use crate::dataset::Dataset;
 use crate::run::FrameStatus;
 use crate::trajectory_file::TimedExposure;
@@ -43,7 +43,11 @@ pub(super) fn all_exposures(
         if frames.records[index].status != FrameStatus::Lost
             && let Ok(observation) = observation(dataset, &sensor, index)
         {
-            let unmapped = Keyframe::new(index, observation, frames.priors[index]);
+            let unmapped = Keyframe::new(
+                index,
+                observation,
+                PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },
+            );
             bundle.fit_frame(&unmapped, &mut state, STEPS);
             observe();
         }

@@ -7,7 +7,7 @@ use image::ImageReader;
 use crate::bundle::BundleAdjustment;
 use crate::dataset::Dataset;
 use crate::evaluation::{DEFAULT_MAX_DT, align_poses, psnr, ssim};
-use crate::rendering::ViewRenderer;
+use crate::rendering::{Behind, ViewRenderer};
 use crate::run::{MapFigures, deblurred_path, mid_pose};
 use crate::trajectory_file::{TimedExposure, TimedPose, read_trajectory};
 
@@ -87,11 +87,10 @@ fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[Ti
     let map_from_truth = alignment.reference_from_estimate.inverse();
     let calibration = dataset.calibration();
     let (camera, response) = (calibration.camera, calibration.response.inverse());
-    let mut renderer =
-        ViewRenderer::new(&bundle.state.gaussians, camera, &response, calibration.depth_scale);
+    let mut renderer = ViewRenderer::new(&bundle.state.gaussians, camera, &response, calibration.depth_scale);
     for (index, pose) in poses.iter().enumerate() {
         let Some(truth) = read(&folder.join(format!("{index:06}.png"))) else { continue };
-        let view = renderer.render(&map_from_truth.compose(&pose.world_from_camera));
+        let view = renderer.render(&map_from_truth.compose(&pose.world_from_camera), Behind::Surroundings);
         scores.add(&truth, &view.rgb);
     }
     scores

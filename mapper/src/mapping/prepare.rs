@@ -6,13 +6,12 @@ use rayon::prelude::*;
 
 use super::choice::choose_keyframes;
 use super::{MapError, MapSettings};
-use crate::bundle::{
-    BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor,
-};
+use crate::bundle::{BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor};
 use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, predict_motions, repair_run, run_frames,
 };
 use crate::dataset::Dataset;
+use crate::evaluation::motion_of;
 use crate::exposure::ExposurePath;
 use crate::run::{FrameRecord, Run};
 use crate::trajectory_file::TimedExposure;
@@ -54,7 +53,9 @@ impl Frames {
         let settings = ContinuitySettings::default();
         let repaired = repair_run(&run.exposures, &run.frames, &seconds, &settings)?;
         let frames = run_frames(&repaired.exposures, &run.frames, &seconds)?;
-        let priors = predict_motions(&frames, &settings).into_iter().map(|motion| PathPrior { motion }).collect();
+        let motions = predict_motions(&frames, &settings).into_iter();
+        let prior = |(motion, exposure)| PathPrior { middle: motion_of(exposure).mid(), motion };
+        let priors = motions.zip(&repaired.exposures).map(prior).collect();
         let warnings = repairs(&repaired, "before");
         Ok(Self { exposures: repaired.exposures, records: run.frames.clone(), priors, warnings })
     }

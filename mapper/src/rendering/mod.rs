@@ -2,4 +2,4 @@
 
 mod view;
 
-pub use view::{RenderedView, SOLID_ALPHA, ViewRenderer};
+pub use view::{Behind, RenderedView, SOLID_ALPHA, ViewRenderer};

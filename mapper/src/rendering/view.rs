@@ -6,9 +6,12 @@ use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::photometric::InverseResponse;
 
+use rayon::prelude::*;
+
 use crate::FileError;
 use crate::deblurring::ForwardResponse;
 use crate::gaussians::Gaussians;
+use crate::infill;
 use crate::png::{encode_depth, encode_rgb};
 use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
 use crate::whole_file::write_together;
@@ -23,9 +26,26 @@ pub struct ViewRenderer<'a> {
     camera: PinholeCamera,
     depth_scale: f32,
     response: ForwardResponse,
+    inverse: InverseResponse,
     rasterizer: Rasterizer,
     scratch: RasterScratch,
     image: RasterImage,
+}
+
+/// What is seen where the map is transparent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Behind<'a> {
+    /// Nothing.
+    Black,
+    /// The colours of the surroundings, where the map is not solid.
+    Surroundings,
+    /// The frame that was captured from there.
+    Captured {
+        /// Red, green and blue as stored, one plane each, as large as the view.
+        colour: &'a [Vec<u8>; 3],
+        /// Gain on the map's light that makes it as bright as the frame.
+        gain: f32,
+    },
 }
 
 /// A rendered view in the form of files.
@@ -55,18 +75,24 @@ impl<'a> ViewRenderer<'a> {
             camera,
             depth_scale: depth_scale as f32,
             response: ForwardResponse::new(response),
+            inverse: response.clone(),
             rasterizer: Rasterizer::new(SimdLevel::new()),
             scratch: RasterScratch::default(),
             image: RasterImage::default(),
         }
     }
 
-    /// The view from a pose, in front of black. It does not depend on the number of threads.
+    /// The view from a pose. It does not depend on the number of threads.
     #[must_use]
-    pub fn render(&mut self, world_from_camera: &RigidTransform) -> RenderedView {
+    pub fn render(&mut self, world_from_camera: &RigidTransform, behind: Behind<'_>) -> RenderedView {
         let view =
             RasterView { camera: self.camera, world_from_camera: *world_from_camera, background: [0.0; 3] };
         self.rasterizer.forward(self.map, &view, &mut self.scratch, &mut self.image);
+        match behind {
+            Behind::Black => (),
+            Behind::Surroundings => fill_holes(&mut self.image),
+            Behind::Captured { colour, gain } => put_in_front(&mut self.image, &self.inverse, colour, gain),
+        }
         let RasterImage { width, height, colour: [red, green, blue], depth, alpha } = &self.image;
         let colours = red.iter().zip(green).zip(blue).map(|((red, green), blue)| [*red, *green, *blue]);
         let solid = alpha.iter().filter(|alpha| **alpha > SOLID_ALPHA).count();
@@ -83,6 +109,30 @@ impl<'a> ViewRenderer<'a> {
         let raw = (depth / alpha * self.depth_scale).round();
         if alpha > SOLID_ALPHA && raw <= f32::from(u16::MAX) { raw as u16 } else { 0 }
     }
+}
+
+/// Multiplies the light by `gain` and puts it in front of a captured image; nothing happens for one of another size.
+fn put_in_front(image: &mut RasterImage, inverse: &InverseResponse, captured: &[Vec<u8>; 3], gain: f32) {
+    for (plane, captured) in image.colour.iter_mut().zip(captured) {
+        for ((light, alpha), byte) in plane.iter_mut().zip(&image.alpha).zip(captured) {
+            *light = gain * *light + (1.0 - alpha) * inverse.linear_light(*byte);
+        }
+    }
+}
+
+/// Completes the colours where the map is not solid from where it is.
+fn fill_holes(image: &mut RasterImage) {
+    let RasterImage { width, colour, alpha, .. } = image;
+    let weights: Vec<f32> =
+        alpha.iter().map(|alpha| if *alpha > SOLID_ALPHA { *alpha } else { 0.0 }).collect();
+    colour.par_iter_mut().for_each(|plane| {
+        // What lies in front of nothing is the colour times alpha.
+        let mut behind: Vec<f32> = plane.iter().zip(&*alpha).map(|(light, alpha)| light / alpha).collect();
+        infill::fill(*width, &mut behind, &weights);
+        for ((light, alpha), behind) in plane.iter_mut().zip(&*alpha).zip(behind) {
+            *light += (1.0 - alpha) * behind;
+        }
+    });
 }
 
 impl RenderedView {
@@ -119,7 +169,7 @@ mod tests {
         let map: Gaussians = [ball].into_iter().collect();
         let camera = PinholeCamera { width: 33, height: 25, fx: 100.0, fy: 100.0, cx: 16.0, cy: 12.0 };
         let mut renderer = ViewRenderer::new(&map, camera, &InverseResponse::srgb(), depth_scale);
-        renderer.render(&RigidTransform::identity())
+        renderer.render(&RigidTransform::identity(), Behind::Black)
     }
 
     #[test]

@@ -20,7 +20,6 @@ pub(super) fn all_exposures(
     bundle: &mut BundleAdjustment,
     frames: &Frames,
     settings: &MapSettings,
-    mut observe: impl FnMut(),
 ) -> Vec<(TimedExposure, f64)> {
     let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
     let sensor = sensor(dataset);
@@ -49,7 +48,6 @@ pub(super) fn all_exposures(
                 PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },
             );
             bundle.fit_frame(&unmapped, &mut state, STEPS);
-            observe();
         }
         all.push((state.path.timed(timestamp), state.log_gain));
     }

@@ -99,7 +99,7 @@ pub fn map_dataset(
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
     frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
 
-    let refined = all_exposures(dataset, &mut bundle, &frames, settings, || ());
+    let refined = all_exposures(dataset, &mut bundle, &frames, settings);
     let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
     let (exposures, repairs) = frames.repair(dataset, &exposures)?;
     repairs.into_iter().for_each(|repair| writer.warn(repair));

@@ -1,10 +1,10 @@
 //! The furnished room, seen by a camera that moves while its shutter is open.
 
-use mba_mapper::exposure::{ExposureGradient, ExposureRenderer, ExposureScratch};
+use mba_mapper::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, PATH_PARAMETERS};
 use mba_mapper::raster::RasterImage;
 use mba_tracker::simd::Level;
 use mba_tracker::trajectory::ExposureTrajectory;
-use nalgebra::Vector6;
+use nalgebra::{SVector, Vector6};
 
 use crate::raster::RasterInput;
 
@@ -14,7 +14,7 @@ const MOTION: [f64; 6] = [0.01, 0.02, 0.0, 0.02, 0.015, 0.0];
 /// A map, an exposure of it, and everything that rendering it needs.
 pub struct ExposureInput {
     room: RasterInput,
-    path: ExposureTrajectory,
+    path: ExposurePath,
     renderer: ExposureRenderer,
     scratch: ExposureScratch,
     image: RasterImage,
@@ -27,7 +27,10 @@ impl ExposureInput {
         let room = RasterInput::room(level, count);
         let motion = Vector6::from(MOTION);
         Self {
-            path: ExposureTrajectory::from_mid_and_motion(&room.view.world_from_camera, &motion),
+            path: ExposurePath::linear(ExposureTrajectory::from_mid_and_motion(
+                &room.view.world_from_camera,
+                &motion,
+            )),
             renderer: ExposureRenderer::new(level),
             scratch: ExposureScratch::default(),
             image: RasterImage::default(),
@@ -42,8 +45,8 @@ impl ExposureInput {
         renderer.forward(&room.gaussians, &room.view.camera, path, views, background, scratch, image);
     }
 
-    /// Takes the gradient back to map and poses.
-    pub fn backward(&mut self) -> ExposureGradient {
+    /// Takes the gradient back to map and path.
+    pub fn backward(&mut self) -> SVector<f64, PATH_PARAMETERS> {
         let RasterInput { gaussians, by_image, gradients, .. } = &mut self.room;
         self.renderer.backward(gaussians, by_image, &mut self.scratch, gradients)
     }

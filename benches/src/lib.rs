@@ -1,5 +1,6 @@
 //! Fixed-seed inputs shared by the benchmarks.
 
+pub mod bundle;
 pub mod exposure;
 pub mod raster;
 pub mod recording;

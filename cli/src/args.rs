@@ -12,7 +12,7 @@ use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
 
-/// Motion-blur-aware RGB-D tracking on a CPU.
+/// Motion-blur-aware RGB-D tracking and mapping on a CPU.
 #[derive(Debug, Parser)]
 #[command(name = "mba", version, propagate_version = true, max_term_width = 100)]
 pub struct Cli {
@@ -45,7 +45,7 @@ pub struct Global {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Render a blurred sequence, track it, and show how well that went; needs no input
+    /// Render a blurred sequence, track and map it, and show how well that went; needs no input
     Demo(Demo),
     /// Render a synthetic, motion-blurred RGB-D data set with exact ground truth
     Synth(Synth),
@@ -67,7 +67,8 @@ pub enum Command {
 /// Arguments of `mba demo`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The folder gets the sequence (kept for the next time), the RUN folder, charts and report.html.
+The folder gets the sequence (kept for the next time), a RUN folder as `mba track` writes it, and one as \
+`mba map` does, with charts and report.html.
 
 Example:
   mba demo --quick")]
@@ -338,7 +339,7 @@ The report is one HTML file without network access: charts, figures and settings
 Example:
   mba report run")]
 pub struct Report {
-    /// RUN folder that `mba track` wrote
+    /// RUN folder that `mba track` or `mba map` wrote
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
     /// Data set with the ground truth, if it has moved since the run

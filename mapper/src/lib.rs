@@ -1,4 +1,16 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
+//!
+//! A [`dataset`], recorded or made by [`synth`], is tracked by [`tracking`] into a [`run`]: poses of every frame at
+//! opening, middle and closing of the shutter, and keyframes that [`deblurring`] inverts.
+//!
+//! [`mapping`] goes on from there. [`continuity`] repairs exposures that do not fit their neighbours; [`bundle`] seeds
+//! [`gaussians`] from depth and adjusts them together with the path of every exposure. A step renders what the moving
+//! camera sees ([`exposure`], the mean of views of [`raster`]), compares it with the captured frame ([`losses`]) and
+//! takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can go on. The
+//! result is another [`run`], with a map.
+//!
+//! [`rendering`] makes images of a map, with [`infill`] where it has nothing; [`evaluation`] and [`image_folders`] compare
+//! results with the truth.
 
 pub mod bundle;
 pub mod checkpoint;

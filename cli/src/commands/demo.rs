@@ -6,12 +6,13 @@ use mba_mapper::dataset::Dataset;
 use mba_mapper::run::Run;
 use mba_mapper::synth::{DepthSensor, NoiseModel, SynthConfig};
 
-use super::{open, synth, track};
+use super::{map, open, synth, track};
+use crate::args::map::Mapping;
 use crate::args::{Demo, Tracking};
 use crate::console::Console;
 use crate::report::{self, table};
 
-/// Synthesises a blurred sequence, tracks it, prints the figures and writes charts and report.
+/// Synthesises a blurred sequence, tracks it, maps it, prints the figures of the map and writes its charts and report.
 ///
 /// # Errors
 /// Failure when the folder cannot be written.
@@ -19,16 +20,19 @@ pub fn run(args: &Demo, console: &Console) -> anyhow::Result<()> {
     let (name, config) =
         if args.quick { ("quick", quick()) } else { ("full", SynthConfig { frames: 60, ..realistic() }) };
     let data = args.out.join(format!("data-{name}"));
-    let run = args.out.join(format!("run-{name}"));
+    let tracked = args.out.join(format!("run-{name}"));
+    let mapped = args.out.join(format!("mapped-{name}"));
     let dataset = sequence(config, &data, console)?;
-    let summary = track::track_into(&dataset, &run, &Tracking::default(), console)?;
-    let path = report::write(&Run::open(&run)?, Some(&dataset))?;
+    track::track_into(&dataset, &tracked, &Tracking::default(), console)?;
+    let run = Run::open(&tracked)?;
+    let summary = map::map_into(&dataset, &run, &mapped, &Mapping::default(), false, console)?;
+    let path = report::write(&Run::open(&mapped)?, Some(&dataset))?;
     console.result(&summary, table::summary)?;
     console.note(format!("open {} in a browser", path.display()));
     Ok(())
 }
 
-/// A sequence that is rendered and tracked within seconds.
+/// A sequence that is rendered and tracked within seconds, and mapped within a minute.
 fn quick() -> SynthConfig {
     SynthConfig { frames: 24, width: 320, height: 240, mean_blur_px: 5.0, ..realistic() }
 }

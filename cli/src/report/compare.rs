@@ -14,8 +14,8 @@ pub(super) fn section(pictures: &[KeyframePictures]) -> String {
         "The data set with the captured images was not at hand."
     };
     format!(
-        "<h2>Keyframes, before and after</h2>\n<p class=\"note\">The most blurred keyframes along the run, deblurred \
-         with their own estimated motion. {note}</p>\n<section class=\"keyframes\">\n{figures}</section>\n"
+        "<h2>Keyframes, before and after</h2>\n<p class=\"note\">The most blurred keyframes along the run, as \
+         captured and deblurred. {note}</p>\n<section class=\"keyframes\">\n{figures}</section>\n"
     )
 }
 

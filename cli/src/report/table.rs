@@ -98,11 +98,14 @@ pub fn map_rows(figures: &MapFigures) -> Vec<(&'static str, String)> {
         ("keyframes deblurred", figures.keyframe_psnr, figures.keyframe_ssim),
         ("views held out", figures.heldout_psnr, figures.heldout_ssim),
     ];
+    let mapped = figures.heldout_psnr_mapped.zip(figures.heldout_mapped_share);
+    let where_mapped = |(db, share)| format!("{db:.2} dB over {} of the pixels", percent(share));
     for (label, psnr, ssim) in likeness {
         let parts = [psnr.map(|db| format!("{db:.2} dB")), ssim.map(|ssim| format!("SSIM {ssim:.4}"))];
         let text = parts.into_iter().flatten().collect::<Vec<_>>().join(", ");
         rows.extend((!text.is_empty()).then_some((label, text)));
     }
+    rows.extend(mapped.map(|mapped| ("  where there is a map", where_mapped(mapped))));
     rows
 }
 

@@ -166,3 +166,57 @@ fn normalise(values: &mut PlanesMut<'_>, i: usize) {
         (ROTATION..ROTATION + 4).for_each(|k| values.planes[k][i] /= norm);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gaussians::Gaussian;
+
+    const LENGTHS: StepLengths =
+        StepLengths { mean: 0.1, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
+
+    fn gaussian() -> Gaussian {
+        Gaussian {
+            mean: [1.0, 2.0, 3.0],
+            log_scale: [0.05_f32.ln(); 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity_logit: 1.0,
+            colour: [0.25, 0.0, 1.0],
+        }
+    }
+
+    fn stepped(gradient: &Gaussian, drawn: bool) -> Gaussian {
+        let mut map: Gaussians = [gaussian()].into_iter().collect();
+        let gradient: Gaussians = [*gradient].into_iter().collect();
+        let mut moments =
+            Moments { first: Gaussians::zeros(1), second: Gaussians::zeros(1), updates: vec![0] };
+        step(&mut map, &gradient, &[drawn], &LENGTHS, &mut moments);
+        map.get(0).unwrap()
+    }
+
+    #[test]
+    fn the_first_step_has_its_length_in_every_unit() {
+        let gradient = Gaussian { opacity_logit: -7.0, colour: [1e-6, 0.0, 3.0], ..Gaussian::default() };
+        let after = stepped(&gradient, true);
+        assert!((after.opacity_logit - 1.05).abs() < 1e-5);
+        // 0.01 (2 sqrt(0.25) + 0.02) and 0.01 (2 + 0.02).
+        assert!((after.colour[0] - (0.25 - 0.0102)).abs() < 1e-5 && (after.colour[2] - 0.9798).abs() < 1e-5);
+        assert_eq!((after.colour[1], after.mean), (0.0, gaussian().mean));
+    }
+
+    #[test]
+    fn a_centre_moves_along_its_gradient_by_a_fraction_of_its_size() {
+        let after = stepped(&Gaussian { mean: [4.0, 0.0, -0.004], ..Gaussian::default() }, true);
+        // One scale for all three: sqrt(16/3), so x moves by sqrt(3) 0.1 0.05 m, and z a thousandth of that.
+        assert!((after.mean[0] - (1.0 - 3.0_f32.sqrt() * 0.005)).abs() < 1e-6, "{:?}", after.mean);
+        assert!((after.mean[2] - 3.0).abs() < 2e-5);
+    }
+
+    #[test]
+    fn what_is_not_drawn_stays_and_quaternions_keep_their_length() {
+        let gradient = Gaussian { mean: [1.0; 3], rotation: [0.3, -0.2, 0.1, 0.9], ..Gaussian::default() };
+        assert_eq!(stepped(&gradient, false), gaussian());
+        let norm: f32 = stepped(&gradient, true).rotation.iter().map(|q| q * q).sum();
+        assert!((norm - 1.0).abs() < 1e-6);
+    }
+}

@@ -147,3 +147,54 @@ pub(super) fn resize(moments: &mut Moments, count: usize) {
     moments.second.resize(count);
     moments.updates.resize(count, 0);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gaussian(mean: [f32; 3], opacity_logit: f32) -> Gaussian {
+        let log_scale = [0.01_f32, 0.1, 0.02].map(f32::ln);
+        Gaussian { mean, log_scale, rotation: [1.0, 0.0, 0.0, 0.0], opacity_logit, colour: [0.5; 3] }
+    }
+
+    fn moments(count: usize) -> Moments {
+        Moments { first: Gaussians::zeros(count), second: Gaussians::zeros(count), updates: vec![3; count] }
+    }
+
+    #[test]
+    fn the_most_torn_is_divided_along_its_longest_axis() {
+        let mut map: Gaussians = [0.0, 1.0, 2.0].map(|x| gaussian([x, 0.0, 0.0], 1.0)).into_iter().collect();
+        let mut moments = moments(3);
+        let mut pull = Pull::zeros(3);
+        // The second is pulled less in all, but only seen once.
+        pull.add(&[1.0, 1.8, 0.5], &[true, true, true]);
+        pull.add(&[1.0, 9.0, 0.5], &[true, false, true]);
+        assert_eq!(divide(&mut map, &mut moments, &pull, 1), 1);
+        assert_eq!((map.len(), moments.updates.len()), (4, 4));
+        let [one, other] = [1, 3].map(|i| map.get(i).unwrap());
+        assert!((one.mean[1] + 0.07).abs() < 1e-6 && (other.mean[1] - 0.07).abs() < 1e-6);
+        assert!((one.log_scale[1].exp() - 0.06).abs() < 1e-6 && one.log_scale[0] == 0.01_f32.ln());
+        assert_eq!((moments.updates[0], moments.updates[1]), (3, 0));
+    }
+
+    #[test]
+    fn faint_huge_and_broken_ones_are_removed() {
+        let mut huge = gaussian([0.0; 3], 1.0);
+        huge.log_scale[2] = 2.0_f32.ln();
+        let mut broken = gaussian([0.0; 3], 1.0);
+        broken.colour[1] = f32::NAN;
+        let mut map: Gaussians =
+            [huge, gaussian([7.0; 3], 0.0), gaussian([0.0; 3], -5.0), broken].into_iter().collect();
+        let mut moments = moments(4);
+        assert_eq!(prune(&mut map, &mut moments), 3);
+        assert_eq!((map.get(0).unwrap().mean, moments.updates.len()), ([7.0; 3], 1));
+    }
+
+    #[test]
+    fn the_curve_keeps_neighbours_together() {
+        let map: Gaussians = (0..64).map(|i| gaussian([(i * 37 % 64) as f32, 0.0, 0.0], 1.0)).collect();
+        let order = morton_order(&map);
+        assert!(order.windows(2).all(|pair| map.planes()[0][pair[0]] < map.planes()[0][pair[1]]));
+        assert_eq!(spread(0b11_1111_1111), 0o1_111_111_111);
+    }
+}

@@ -1,5 +1,7 @@
 //! Losses of one rendered exposure against what was captured, and their gradients by the rendered image.
 
+use core::ops::Range;
+
 use rayon::prelude::*;
 
 use super::display::DisplayCurve;
@@ -57,18 +59,54 @@ impl LossTerms {
 #[derive(Debug, Default)]
 pub(super) struct DisplayPlanes {
     /// Rendered display values.
-    pub(super) rendered: [Vec<f32>; 3],
+    rendered: [Vec<f32>; 3],
     /// Captured display values; the rendered ones where they do not count.
-    pub(super) captured: [Vec<f32>; 3],
+    captured: [Vec<f32>; 3],
     /// Slope of display value by light.
     slope: [Vec<f32>; 3],
     /// Gradient of the loss by the rendered display values.
-    pub(super) gradient: [Vec<f32>; 3],
+    gradient: [Vec<f32>; 3],
+}
+
+/// One row of one channel, as [`DisplayPlanes`] has it.
+struct Row<'a> {
+    rendered: &'a mut [f32],
+    captured: &'a mut [f32],
+    slope: &'a mut [f32],
+    gradient: &'a mut [f32],
+}
+
+impl Row<'_> {
+    /// Compares the pixels in `columns`; the others count as equal. Returns the sums of smooth absolute and of squared
+    /// differences.
+    fn compare(
+        &mut self,
+        curve: &DisplayCurve,
+        gain: f32,
+        light: &[f32],
+        bytes: &[u8],
+        columns: Range<usize>,
+        weight: f32,
+    ) -> [f32; 2] {
+        let mut sums = [0.0_f32; 2];
+        for (x, (&light, &byte)) in light.iter().zip(bytes).enumerate() {
+            let [value, by_light] = curve.at(gain * light);
+            let target = f32::from(byte) * (1.0 / 255.0);
+            let counts = columns.contains(&x) && !(byte >= CLIPPED && value > target);
+            let target = if counts { target } else { value };
+            let (loss, by_value) = smooth_absolute(value - target, NOISE);
+            (self.rendered[x], self.captured[x]) = (value, target);
+            (self.slope[x], self.gradient[x]) = (by_light * gain, weight * by_value);
+            sums[0] += loss;
+            sums[1] += (value - target) * (value - target);
+        }
+        sums
+    }
 }
 
 impl DisplayPlanes {
     /// Takes a rendered image to display values, with `gain` on its light, and starts the gradient with the colour
-    /// term. Returns that term and the mean squared difference.
+    /// term. Returns that term and the mean squared difference. Image and observation have the same size.
     pub(super) fn compare(
         &mut self,
         curve: &DisplayCurve,
@@ -77,59 +115,44 @@ impl DisplayPlanes {
         seen: &Observation,
         weight: f32,
     ) -> LossTerms {
-        let pixels = image.width * image.height;
-        let width = image.width;
         let region = seen.region;
-        let counted = (region.right - region.left) * (region.bottom - region.top) * 3;
+        let counted = region.right.saturating_sub(region.left) * region.bottom.saturating_sub(region.top) * 3;
         let share = 1.0 / counted.max(1) as f32;
+        let columns = |y: usize| {
+            let inside = (region.top..region.bottom).contains(&y);
+            if inside { region.left..region.right } else { 0..0 }
+        };
         let mut sums = [0.0_f64; 2];
         for channel in 0..3 {
-            let [rendered, captured, slope, gradient] = [
-                &mut self.rendered[channel],
-                &mut self.captured[channel],
-                &mut self.slope[channel],
-                &mut self.gradient[channel],
-            ]
-            .map(|plane| {
-                plane.resize(pixels, 0.0);
-                plane
-            });
-            let rows = (
-                rendered.par_chunks_mut(width),
-                captured.par_chunks_mut(width),
-                slope.par_chunks_mut(width),
-                gradient.par_chunks_mut(width),
-                image.colour[channel].par_chunks(width),
-                seen.colour[channel].par_chunks(width),
-            );
-            let of_row = |(y, (rendered, captured, slope, gradient, light, bytes)): (usize, RowOf<'_>)| {
-                let mut sums = [0.0_f32; 2];
-                let inside_rows = (region.top..region.bottom).contains(&y);
-                for x in 0..width {
-                    let [value, by_light] = curve.at(gain * light[x]);
-                    let byte = bytes[x];
-                    let target = f32::from(byte) * (1.0 / 255.0);
-                    let counts = inside_rows
-                        && (region.left..region.right).contains(&x)
-                        && !(byte >= CLIPPED && value > target);
-                    let target = if counts { target } else { value };
-                    let (loss, by_value) = smooth_absolute(value - target, NOISE);
-                    rendered[x] = value;
-                    captured[x] = target;
-                    slope[x] = by_light * gain;
-                    gradient[x] = weight * share * by_value;
-                    sums[0] += loss;
-                    sums[1] += (value - target) * (value - target);
-                }
-                sums
+            let rows = self.rows(channel, image.width, image.height);
+            let (light, bytes) = (&image.colour[channel], &seen.colour[channel]);
+            let given = (light.par_chunks(image.width), bytes.par_chunks(image.width));
+            let compare = |(y, (mut row, (light, bytes))): (usize, (Row<'_>, (&[f32], &[u8])))| {
+                row.compare(curve, gain, light, bytes, columns(y), weight * share)
             };
-            let of_rows: Vec<[f32; 2]> = rows.into_par_iter().enumerate().map(of_row).collect();
+            let of_rows: Vec<[f32; 2]> = rows.zip(given).enumerate().map(compare).collect();
             for row in of_rows {
                 sums.iter_mut().zip(row).for_each(|(sum, row)| *sum += f64::from(row));
             }
         }
         let [absolute, square] = sums.map(|sum| sum * f64::from(share));
         LossTerms { colour: f64::from(weight) * absolute, mean_square: square, ..LossTerms::default() }
+    }
+
+    /// The rows of a channel, with room for an image of that size.
+    fn rows(
+        &mut self,
+        channel: usize,
+        width: usize,
+        height: usize,
+    ) -> impl IndexedParallelIterator<Item = Row<'_>> {
+        let planes = [&mut self.rendered, &mut self.captured, &mut self.slope, &mut self.gradient];
+        let [rendered, captured, slope, gradient] = planes.map(|plane| {
+            plane[channel].resize(width * height, 0.0);
+            plane[channel].par_chunks_mut(width)
+        });
+        let zipped = (rendered, captured, slope, gradient).into_par_iter();
+        zipped.map(|(rendered, captured, slope, gradient)| Row { rendered, captured, slope, gradient })
     }
 
     /// Adds the term of structural similarity, `weight` times one minus it, to the gradient and returns it.
@@ -163,9 +186,6 @@ impl DisplayPlanes {
         by_gain
     }
 }
-
-/// Rows of the planes of one channel.
-type RowOf<'a> = (&'a mut [f32], &'a mut [f32], &'a mut [f32], &'a mut [f32], &'a [f32], &'a [u8]);
 
 /// Depth and alpha terms; their gradients replace those by depth and alpha in `out`.
 pub(super) fn compare_depth(
@@ -216,4 +236,91 @@ type DepthRow<'a> = (&'a mut [f32], &'a mut [f32], &'a [f32], &'a [f32], &'a [f3
 fn smooth_absolute(r: f32, noise: f32) -> (f32, f32) {
     let root = (r * r + noise * noise).sqrt();
     (root - noise, r / root)
+}
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::PinholeCamera;
+    use mba_tracker::image::PixelRectangle;
+    use mba_tracker::photometric::InverseResponse;
+
+    use super::*;
+
+    const SIZE: [usize; 2] = [6, 5];
+    const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.0, depth: 3.0, alpha: 0.2 };
+
+    fn fraction(i: usize) -> f32 {
+        ((i * 7919 + 17) % 101) as f32 / 101.0
+    }
+
+    fn image() -> RasterImage {
+        let mut image = RasterImage::zeros(SIZE[0], SIZE[1]);
+        for pixel in 0..30 {
+            (0..3).for_each(|c| image.colour[c][pixel] = 0.1 + 0.8 * fraction(3 * pixel + c));
+            image.alpha[pixel] = 0.92 + 0.07 * fraction(pixel + 500);
+            image.depth[pixel] = image.alpha[pixel] * (2.0 + fraction(pixel + 900));
+        }
+        image
+    }
+
+    fn observation() -> Observation {
+        let [width, height] = SIZE;
+        let plane = |c: usize| (0..30).map(|pixel| (20.0 + 200.0 * fraction(7 * pixel + c)) as u8).collect();
+        Observation {
+            camera: PinholeCamera { width, height, fx: 5.0, fy: 5.0, cx: 2.5, cy: 2.0 },
+            colour: [plane(0), plane(1), plane(2)],
+            depth: (0..30)
+                .map(|pixel| if pixel % 7 == 0 { 0.0 } else { 2.0 + fraction(pixel + 77) })
+                .collect(),
+            region: PixelRectangle { left: 1, top: 0, right: 6, bottom: 4 },
+        }
+    }
+
+    /// Loss of an image and the gradient by it.
+    fn loss(image: &RasterImage, gain: f32) -> (f64, RasterImage, f64) {
+        let curve = DisplayCurve::new(&InverseResponse::linear());
+        let (seen, mut planes) = (observation(), DisplayPlanes::default());
+        let mut gradient = RasterImage::zeros(SIZE[0], SIZE[1]);
+        let mut terms = planes.compare(&curve, gain, image, &seen, WEIGHTS.colour);
+        let by_log_gain = planes.gradient_by_light(image, &mut gradient);
+        terms.depth = compare_depth(image, &seen, &WEIGHTS, &mut gradient);
+        (terms.total(), gradient, by_log_gain)
+    }
+
+    #[test]
+    fn gradients_are_those_of_finite_differences() {
+        let (step, image) = (2e-3_f32, image());
+        let (_, gradient, by_log_gain) = loss(&image, 1.1);
+        let check = |what: &str, pixel: usize, analytic: f32, change: &dyn Fn(&mut RasterImage, f32)| {
+            let moved = |by: f32| {
+                let mut moved = image.clone();
+                change(&mut moved, by);
+                loss(&moved, 1.1).0
+            };
+            let numeric = (moved(step) - moved(-step)) / f64::from(2.0 * step);
+            let error = (numeric - f64::from(analytic)).abs();
+            assert!(error < 2e-4 + 0.03 * numeric.abs(), "{what} {pixel}: {analytic} instead of {numeric}");
+        };
+        for pixel in 0..30 {
+            check("red", pixel, gradient.colour[0][pixel], &|image, by| image.colour[0][pixel] += by);
+            check("blue", pixel, gradient.colour[2][pixel], &|image, by| image.colour[2][pixel] += by);
+            check("depth", pixel, gradient.depth[pixel], &|image, by| image.depth[pixel] += by);
+            check("alpha", pixel, gradient.alpha[pixel], &|image, by| image.alpha[pixel] += by);
+        }
+        let numeric = (loss(&image, 1.1 * 1.001).0 - loss(&image, 1.1 / 1.001).0) / (2.0 * 1.001_f64.ln());
+        assert!((numeric - by_log_gain).abs() < 1e-3 + 0.02 * numeric.abs(), "{by_log_gain}, not {numeric}");
+    }
+
+    #[test]
+    fn pixels_outside_of_the_region_and_clipped_light_do_not_count() {
+        let curve = DisplayCurve::new(&InverseResponse::linear());
+        let (mut image, mut seen) = (image(), observation());
+        seen.colour.iter_mut().for_each(|plane| plane.fill(255));
+        image.colour.iter_mut().for_each(|plane| plane.fill(3.0));
+        let bright = DisplayPlanes::default().compare(&curve, 1.0, &image, &seen, 1.0);
+        assert_eq!((bright.colour, bright.mean_square), (0.0, 0.0));
+        image.colour.iter_mut().for_each(|plane| plane.fill(0.5));
+        let grey = DisplayPlanes::default().compare(&curve, 1.0, &image, &seen, 1.0);
+        assert!((grey.mean_square - 0.25).abs() < 1e-3, "20 of 30 pixels differ, and 20 are counted");
+    }
 }

@@ -56,6 +56,15 @@ impl PathMetric {
         }
     }
 
+    /// Units of that many metres and radians.
+    #[cfg(test)]
+    pub(super) fn uniform(metres: f64, radians: f64) -> Self {
+        let scale = Vector6::new(metres, metres, metres, radians, radians, radians);
+        let [tangent_from_unit, unit_from_tangent] =
+            [scale, scale.map(|length| 1.0 / length)].map(|scale| Matrix6::from_diagonal(&scale));
+        Self { tangent_from_unit, unit_from_tangent }
+    }
+
     /// The tangent, translation in the world, of a move given in units.
     #[must_use]
     pub fn tangent(&self, path: &ExposurePath, units: &Vector6<f64>) -> Vector6<f64> {
@@ -118,4 +127,81 @@ fn roots(a: &Matrix6<f64>) -> [Matrix6<f64>; 2] {
     let root = eigen.eigenvalues.map(|value| value.max(FAINTEST * typical).sqrt());
     let stretch = Matrix6::from_diagonal(&root.map(|root| 1.0 / root));
     [eigen.eigenvectors * stretch, Matrix6::from_diagonal(&root) * eigen.eigenvectors.transpose()]
+}
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::image::PixelRectangle;
+    use mba_tracker::trajectory::ExposureTrajectory;
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    /// A textured floor that recedes from 1 to 3 m.
+    fn observation() -> Observation {
+        let (width, height) = (80, 60);
+        let texture = |x: usize, y: usize| ((x * 37 + y * 91 + x * y * 13) % 256) as u8;
+        let plane: Vec<u8> = (0..width * height).map(|pixel| texture(pixel % width, pixel / width)).collect();
+        Observation {
+            camera: PinholeCamera { width, height, fx: 70.0, fy: 70.0, cx: 39.5, cy: 29.5 },
+            colour: [plane.clone(), plane.clone(), plane],
+            depth: (0..width * height)
+                .map(|pixel| 3.0 - 2.0 * (pixel / width) as f32 / height as f32)
+                .collect(),
+            region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+        }
+    }
+
+    fn path() -> ExposurePath {
+        let rotation = UnitQuaternion::from_scaled_axis(Vector3::new(0.4, -0.8, 0.3));
+        ExposurePath::linear(ExposureTrajectory::still(RigidTransform::new(
+            rotation,
+            Vector3::new(1.0, 2.0, 3.0),
+        )))
+    }
+
+    /// Root mean square of how far the picture moves, pixels per axis.
+    fn movement_of(seen: &Observation, path: &ExposurePath, tangent: &Vector6<f64>) -> f64 {
+        let moved_from_world = path.mid().perturbed(tangent).inverse();
+        let pixels = (0..80).flat_map(|x| (0..60).map(move |y| (x, y)));
+        let squares = pixels.map(|(x, y)| {
+            let (u, v) = (f64::from(x), f64::from(y));
+            let point = seen.camera.ray(u, v) * f64::from(seen.depth[(y * 80 + x) as usize]);
+            let moved =
+                seen.camera.project(&moved_from_world.transform_point(&path.mid().transform_point(&point)));
+            0.5 * ((moved.x - u).powi(2) + (moved.y - v).powi(2))
+        });
+        (squares.sum::<f64>() / 4800.0).sqrt()
+    }
+
+    #[test]
+    fn every_unit_moves_the_picture_by_about_a_pixel_also_along_the_valley() {
+        let (seen, path) = (observation(), path());
+        let metric = PathMetric::new(&seen, 2.0);
+        for k in 0..6 {
+            let tangent = metric.tangent(&path, &(Vector6::ith(k, 0.01)));
+            let pixels = movement_of(&seen, &path, &tangent) / 0.01;
+            assert!((0.3..1.7).contains(&pixels), "unit {k} moves {pixels} pixels");
+        }
+    }
+
+    #[test]
+    fn units_and_gradients_go_there_and_back() {
+        let (seen, path) = (observation(), path());
+        let metric = PathMetric::new(&seen, 2.0);
+        let units = Vector6::new(0.3, -0.2, 0.5, 0.1, -0.4, 0.2);
+        let tangent = metric.tangent(&path, &units);
+        assert!((metric.units(&path, &tangent) - units).norm() < 1e-9);
+        let by_tangent = Vector6::new(1.0, 2.0, -1.0, 0.5, 3.0, -2.0);
+        let change = by_tangent.dot(&tangent);
+        assert!((metric.by_units(&path, &by_tangent).dot(&units) - change).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_picture_without_texture_has_a_metric_too() {
+        let mut seen = observation();
+        seen.colour.iter_mut().for_each(|plane| plane.fill(100));
+        let metric = PathMetric::new(&seen, 2.0);
+        assert!(metric.tangent(&path(), &Vector6::repeat(1.0)).iter().all(|x| x.is_finite()));
+    }
 }

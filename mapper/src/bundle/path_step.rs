@@ -26,9 +26,10 @@ const LONGEST: f64 = 3.0;
 /// Moments of the gradients of one path.
 ///
 /// The parameters are the middle, the motion from opening to closing and the bow, each six numbers in the units of a
-/// [`PathMetric`], which move the picture by about a pixel. In these coordinates the problem nearly falls apart into three: the middle says where
-/// the picture is, the motion how it is smeared, the bow in which shape. All directions share one scale of step, that
-/// of the middle, so that what the picture does not show hardly moves: Adam's own scales would let it wander.
+/// [`PathMetric`], which move the picture by about a pixel. In these coordinates the problem nearly falls apart into
+/// three: the middle says where the picture is, the motion how it is smeared, the bow in which shape. All directions
+/// share one scale of step, that of the middle, so that what the picture does not show hardly moves: Adam's own scales
+/// would let it wander.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PathMoments {
     first: [[f64; 6]; 3],
@@ -48,8 +49,8 @@ impl Default for PathMoments {
 /// What is known of a path besides its picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPrior {
-    /// Where the tracker found the middle of the linear motion, `world_from_camera`. It measured every frame against depth;
-    /// without it the scale of map and path together, which no picture shows, would drift.
+    /// Where the tracker found the middle of the linear motion, `world_from_camera`. It measured every frame against
+    /// depth; the scale of map and paths together, which no picture shows, would drift.
     pub middle: RigidTransform,
     /// Motion that the neighbours in time suggest.
     pub motion: Option<MotionPrediction>,
@@ -58,7 +59,7 @@ pub struct PathPrior {
 /// How far one step goes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathStep {
-    /// Typical movement of the picture, full-resolution pixels.
+    /// Typical movement of the picture, units of the metric.
     pub pixels: f64,
     /// The middle stays where it is.
     pub hold_middle: bool,
@@ -76,18 +77,13 @@ impl PathMoments {
         metric: &PathMetric,
         step: PathStep,
     ) {
-        let [middle, motion, bow] = by_coordinates(gradient).map(|block| metric.by_units(path, &block));
+        let blocks = by_coordinates(gradient).map(|block| metric.by_units(path, &block));
         self.updates += 1;
         let updates = self.updates.min(10_000) as i32;
         let corrections = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powi(updates)));
-        self.second = BETA_2 * self.second + (1.0 - BETA_2) * middle.norm_squared() / 6.0;
+        self.second = BETA_2 * self.second + (1.0 - BETA_2) * blocks[0].norm_squared() / 6.0;
         let typical = (self.second * corrections[1]).sqrt() + 1e-20;
-        let prior_motion = metric.by_units(path, &prior.gradient_by_motion(path));
-        let prior_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
-        let drift = metric.units(path, &prior.middle.tangent_to(&path.ends.mid()));
-        let prior_middle = drift * MIDDLE_COST;
-        let middle = middle + prior_middle;
-        let gradients = [middle, motion + capped(prior_motion, typical), bow + capped(prior_bow, typical)];
+        let gradients = self.with_prior(blocks, typical, path, prior, metric);
         let scale = -step.pixels * corrections[0] / typical;
         let mut moves = [Vector6::zeros(); 3];
         for (block, (mean, gradient)) in self.first.iter_mut().zip(gradients).enumerate() {
@@ -104,6 +100,22 @@ impl PathMoments {
         self.bow_units = (Vector6::from(self.bow_units) + moves[2]).into();
         let tangents = moves.map(|units| metric.tangent(path, &units));
         *path = path.perturbed(&from_coordinates(&tangents));
+    }
+
+    /// The gradients by middle, motion and bow with those of the prior, units of the metric. Motion and bow are never
+    /// pulled harder than a middle is by its picture, `typical`.
+    fn with_prior(
+        &self,
+        [middle, motion, bow]: [Vector6<f64>; 3],
+        typical: f64,
+        path: &ExposurePath,
+        prior: &PathPrior,
+        metric: &PathMetric,
+    ) -> [Vector6<f64>; 3] {
+        let drift = metric.units(path, &prior.middle.tangent_to(&path.ends.mid()));
+        let by_motion = metric.by_units(path, &prior.gradient_by_motion(path));
+        let by_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
+        [middle + drift * MIDDLE_COST, motion + capped(by_motion, typical), bow + capped(by_bow, typical)]
     }
 }
 
@@ -146,16 +158,21 @@ mod tests {
 
     use super::*;
 
-    const UNITS: PathUnits = PathUnits { metres: 0.008, radians: 0.002 };
+    const METRES: f64 = 0.008;
+    const RADIANS: f64 = 0.002;
+
+    fn prior() -> PathPrior {
+        PathPrior { middle: RigidTransform::identity(), motion: None }
+    }
 
     /// Minimises half the squared distance of the path's parameters from a target, in pixels.
-    fn descend(target: &[Vector6<f64>; 3], prior: PathPrior, hold_middle: bool) -> [Vector6<f64>; 3] {
+    fn descend(target: &[Vector6<f64>; 3], prior: &PathPrior, hold_middle: bool) -> [Vector6<f64>; 3] {
         let mut path = ExposurePath::linear(ExposureTrajectory::still(RigidTransform::identity()));
         let mut moments = PathMoments::default();
-        let unit = UNITS.tangent();
+        let metric = PathMetric::uniform(METRES, RADIANS);
+        let unit = Vector6::new(METRES, METRES, METRES, RADIANS, RADIANS, RADIANS);
         let state = |path: &ExposurePath| {
-            let origin = RigidTransform::identity();
-            let middle = origin.tangent_to(&path.ends.mid());
+            let middle = RigidTransform::identity().tangent_to(&path.ends.mid());
             [middle, path.ends.motion(), path.bow].map(|x| x.component_div(&unit))
         };
         for k in 0..400 {
@@ -165,8 +182,8 @@ mod tests {
             gradient.fixed_rows_mut::<6>(0).copy_from(&(a * 0.5 - b));
             gradient.fixed_rows_mut::<6>(6).copy_from(&(a * 0.5 + b));
             gradient.fixed_rows_mut::<6>(12).copy_from(&c);
-            let pixels = 0.1 * 0.98_f64.powi(k);
-            moments.step(&mut path, &gradient, &prior, UNITS, PathStep { pixels, hold_middle, still: false });
+            let step = PathStep { pixels: 0.1 * 0.98_f64.powi(k), hold_middle, still: false };
+            moments.step(&mut path, &gradient, prior, &metric, step);
         }
         state(&path)
     }
@@ -178,7 +195,7 @@ mod tests {
             Vector6::new(1.0, 0.5, -0.5, 0.3, 0.8, -0.6),
             Vector6::new(0.2, -0.3, 0.1, 0.4, 0.1, -0.2),
         ];
-        let found = descend(&target, PathPrior::default(), false);
+        let found = descend(&target, &prior(), false);
         for (found, target) in found.iter().zip(&target) {
             assert!((found - target).norm() < 0.1, "{found} instead of {target}");
         }
@@ -187,7 +204,27 @@ mod tests {
     #[test]
     fn a_held_middle_stays() {
         let target = [Vector6::repeat(0.5), Vector6::repeat(0.5), Vector6::zeros()];
-        let [middle, motion, _] = descend(&target, PathPrior::default(), true);
+        let [middle, motion, _] = descend(&target, &prior(), true);
         assert!(middle.norm() < 1e-3 && (motion - target[1]).norm() < 0.1, "{middle} {motion}");
+    }
+
+    #[test]
+    fn without_a_picture_the_motion_is_the_predicted_one_and_the_middle_the_tracked_one() {
+        let motion = Vector6::new(0.01, 0.0, -0.005, 0.0, 0.002, 0.0);
+        let predicted = MotionPrediction { motion, translation_sigma: 0.01, rotation_sigma: 0.002 };
+        let prior = PathPrior { motion: Some(predicted), ..prior() };
+        let away = Vector6::new(METRES, 0.0, 0.0, 0.0, RADIANS, 0.0);
+        let mut path =
+            ExposurePath::linear(ExposureTrajectory::still(RigidTransform::identity().perturbed(&away)));
+        let (mut moments, metric) = (PathMoments::default(), PathMetric::uniform(METRES, RADIANS));
+        // The noise of a picture that says nothing.
+        let noise = |k: i32| SMatrix::<f64, PATH_PARAMETERS, 1>::repeat(0.02 * f64::from(1 - 2 * (k % 2)));
+        for k in 0..3000 {
+            let step = PathStep { pixels: 0.05, hold_middle: false, still: false };
+            moments.step(&mut path, &noise(k), &prior, &metric, step);
+        }
+        let [off, missing] = [path.ends.mid().tangent_to(&prior.middle), path.ends.motion() - motion];
+        assert!(off[0].abs() < 0.1 * METRES && off[4].abs() < 0.1 * RADIANS, "{off}");
+        assert!(missing.norm() < 0.3 * motion.norm(), "{missing}");
     }
 }

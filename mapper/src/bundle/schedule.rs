@@ -62,7 +62,7 @@ const DENSITY_UNTIL: f64 = 0.6;
 
 const LENGTHS: StepLengths =
     StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
-const PATH_PIXELS: f64 = 0.05;
+const PATH_PIXELS: f64 = 0.03;
 const LOG_GAIN: f64 = 2e-3;
 const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, alpha: 0.01 };
 
@@ -123,5 +123,40 @@ impl Schedule {
     pub fn density_changes(&self, before: f64, after: f64) -> bool {
         let count = |position: f64| (position.min(DENSITY_UNTIL) * DENSITY_CHANGES / DENSITY_UNTIL).floor();
         count(after) > count(before)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stages_follow_each_other_and_end_at_full_resolution() {
+        let schedule = Schedule::new(50);
+        assert_eq!(schedule.steps(), 50 * 30);
+        for timed in [false, true] {
+            let stages: Vec<usize> = (0..=100).map(|k| schedule.stage(f64::from(k) / 100.0, timed)).collect();
+            assert!(stages.is_sorted() && stages[0] == 0 && stages[100] == 2, "{stages:?}");
+        }
+        assert_eq!(schedule.plan(0.0, false).level, 1);
+        assert_eq!(schedule.plan(1.5, true).level, 0);
+    }
+
+    #[test]
+    fn steps_shrink_and_paths_start_late() {
+        let schedule = Schedule::new(10);
+        let [start, middle, end] = [0.0, 0.5, 1.0].map(|position| schedule.plan(position, false));
+        assert_eq!((start.path_pixels, start.log_gain), (0.0, 0.0));
+        assert!(middle.path_pixels > end.path_pixels && end.path_pixels > 0.0);
+        assert!((end.lengths.mean / start.lengths.mean - 0.03).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_density_changes_sixteen_times_and_then_no_more() {
+        let schedule = Schedule::new(10);
+        let at = |k: u32| f64::from(k) / 1000.0;
+        let changes = (0..1000).filter(|&k| schedule.density_changes(at(k), at(k + 1))).count();
+        assert_eq!(changes, 16);
+        assert!(!schedule.density_changes(0.61, 1.0));
     }
 }

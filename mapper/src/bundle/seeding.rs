@@ -160,3 +160,55 @@ impl Squares<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::PinholeCamera;
+    use mba_tracker::image::PixelRectangle;
+
+    use super::*;
+
+    /// A grey wall at 2 m with a striped square, and a hole in its depth.
+    fn observation() -> Observation {
+        let (width, height) = (64, 48);
+        let stripes = |x: usize, y: usize| x < 16 && y < 16 && x.is_multiple_of(2);
+        let pixels = || (0..width * height).map(move |pixel| (pixel % width, pixel / width));
+        let plane: Vec<u8> = pixels().map(|(x, y)| if stripes(x, y) { 250 } else { 100 }).collect();
+        Observation {
+            camera: PinholeCamera { width, height, fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 },
+            colour: [plane.clone(), plane.clone(), plane],
+            depth: pixels().map(|(x, y)| if x >= 48 && y >= 32 { 0.0 } else { 2.0 }).collect(),
+            region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+        }
+    }
+
+    fn seeded(covered: f32, source: DepthSource, room: usize) -> Gaussians {
+        let (seen, mut map) = (observation(), Gaussians::default());
+        let alpha = vec![covered; 64 * 48];
+        let pose = RigidTransform { translation: Vector3::new(0.0, 0.0, 5.0), ..RigidTransform::identity() };
+        let response = InverseResponse::linear();
+        let added = seed(&mut map, &seen, &response, &pose, &alpha, source, room);
+        assert_eq!(added, map.len());
+        map
+    }
+
+    #[test]
+    fn squares_follow_the_detail_and_lie_on_the_surface() {
+        let map = seeded(0.0, DepthSource::Measured, 1000);
+        // The striped square in squares of 2, ten others of 16; the one without depth stays empty.
+        assert_eq!(map.len(), 64 + 10);
+        let sizes: Vec<f32> = map.planes()[3].iter().map(|log| log.exp()).collect();
+        let fine = sizes.iter().filter(|size| (**size - 0.5 * 2.0 * 2.0 / 60.0).abs() < 1e-4).count();
+        assert_eq!(fine, 64);
+        assert!(map.planes()[2].iter().all(|z| (z - 7.0).abs() < 1e-4));
+    }
+
+    #[test]
+    fn holes_in_depth_can_be_completed_and_covered_pixels_get_nothing() {
+        let map = seeded(0.0, DepthSource::Completed, 1000);
+        assert_eq!(map.len(), 64 + 11);
+        assert!(map.planes()[2].iter().all(|z| (z - 7.0).abs() < 1e-2));
+        assert_eq!(seeded(0.6, DepthSource::Completed, 1000).len(), 0);
+        assert_eq!(seeded(0.0, DepthSource::Measured, 5).len(), 5);
+    }
+}

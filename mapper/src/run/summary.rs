@@ -111,6 +111,12 @@ pub struct MapFigures {
     /// SSIM of the same.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_ssim: Option<f64>,
+    /// PSNR of the same over the pixels that show the map, dB: held-out views look beyond what the frames saw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heldout_psnr_mapped: Option<f64>,
+    /// Share (0 to 1) of these pixels.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heldout_mapped_share: Option<f64>,
 }
 
 /// Where the bulk and the tail of a quantity lie.

@@ -1,6 +1,6 @@
 //! Blurred images against the mean of the oracle's views, and gradients by both ends of the exposure.
 
-use mba_mapper::exposure::{ExposureGradient, ExposureRenderer, ExposureScratch};
+use mba_mapper::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, PATH_PARAMETERS};
 use mba_mapper::gaussians::{COLOUR, Gaussians, LOG_SCALE, MEAN, OPACITY_LOGIT};
 use mba_mapper::raster::reference::{
     Cutoff, ReferenceGaussian, ReferenceGradients, ReferenceImage, ReferencePixelGradient, gradients, render,
@@ -12,7 +12,7 @@ use mba_tests::raster_scene::{
 use mba_tests::transfer_scene::Uniform;
 use mba_tracker::simd::Level;
 use mba_tracker::trajectory::ExposureTrajectory;
-use nalgebra::{SMatrix, Vector3, Vector6};
+use nalgebra::{SMatrix, SVector, Vector3, Vector6};
 
 /// See the tolerances of single views: errors of the views do not add up in their mean.
 const IMAGE_TOLERANCE: f64 = 2e-5;
@@ -22,7 +22,7 @@ const GRADIENT_TOLERANCE: f64 = 3e-5;
 
 struct Scene {
     view: RasterView,
-    path: ExposureTrajectory,
+    path: ExposurePath,
     truth: Vec<ReferenceGaussian>,
     gaussians: Gaussians,
     by_pixels: ReferencePixelGradient,
@@ -33,7 +33,7 @@ struct Scene {
 struct Exposed {
     image: RasterImage,
     gradients: GaussianGradients,
-    by_ends: ExposureGradient,
+    by_path: SVector<f64, PATH_PARAMETERS>,
     drawn: Vec<bool>,
 }
 
@@ -46,7 +46,8 @@ impl Scene {
         let gaussians: Gaussians = truth.iter().map(to_parameters).collect();
         let by_pixels = random_pixel_gradient(&mut uniform, &view);
         let motion = Vector6::from_fn(|_, _| uniform.within(-0.1, 0.1));
-        let path = ExposureTrajectory::from_mid_and_motion(&view.world_from_camera, &motion);
+        let ends = ExposureTrajectory::from_mid_and_motion(&view.world_from_camera, &motion);
+        let path = ExposurePath { ends, bow: motion * 0.1 };
         Self { view, path, truth, gaussians, by_pixels }
     }
 
@@ -57,8 +58,8 @@ impl Scene {
         renderer.forward(&self.gaussians, camera, &self.path, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(self.gaussians.len());
         let by_image = to_image(&self.view, &self.by_pixels);
-        let by_ends = renderer.backward(&self.gaussians, &by_image, &mut scratch, &mut gradients);
-        Exposed { image, gradients, by_ends, drawn: scratch.drawn_mask().to_vec() }
+        let by_path = renderer.backward(&self.gaussians, &by_image, &mut scratch, &mut gradients);
+        Exposed { image, gradients, by_path, drawn: scratch.drawn_mask().to_vec() }
     }
 
     /// The views of the oracle, at the middles of equal parts of the exposure, and the gradient by each.
@@ -109,13 +110,13 @@ fn the_image_is_the_mean_of_the_oracles_views() {
     }
 }
 
-/// Derivative of the pose at `time` by those at both ends, by central differences.
-fn pose_by_ends(path: &ExposureTrajectory, time: f64) -> SMatrix<f64, 6, 12> {
+/// Derivative of the pose at `time` by the parameters of the path, by central differences.
+fn pose_by_path(path: &ExposurePath, time: f64) -> SMatrix<f64, 6, PATH_PARAMETERS> {
     const STEP: f64 = 1e-6;
     let pose = path.at(time);
-    let mut jacobian = SMatrix::<f64, 6, 12>::zeros();
-    for k in 0..12 {
-        let tangent = SMatrix::<f64, 12, 1>::from_fn(|i, _| if i == k { STEP } else { 0.0 });
+    let mut jacobian = SMatrix::<f64, 6, PATH_PARAMETERS>::zeros();
+    for k in 0..PATH_PARAMETERS {
+        let tangent = SMatrix::<f64, PATH_PARAMETERS, 1>::from_fn(|i, _| if i == k { STEP } else { 0.0 });
         let moved = |sign: f64| pose.tangent_to(&path.perturbed(&(tangent * sign)).at(time));
         jacobian.set_column(k, &((moved(1.0) - moved(-1.0)) / (2.0 * STEP)));
     }
@@ -129,11 +130,11 @@ fn gradients_are_the_sums_over_the_oracles_views() {
     let mut colour = vec![Vector3::zeros(); 60];
     let mut mean = vec![Vector3::zeros(); 60];
     let (mut opacity, mut screen) = (vec![0.0; 60], vec![0.0; 60]);
-    let mut by_ends = SMatrix::<f64, 12, 1>::zeros();
+    let mut by_path = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
     for (time, view, by_pixels) in scene.virtual_views(views) {
         let ReferenceGradients { gaussians, view: by_view } =
             gradients(&scene.truth, &view, &by_pixels, Cutoff::Hard);
-        by_ends += pose_by_ends(&scene.path, time).transpose() * by_view.tangent(&view.world_from_camera);
+        by_path += pose_by_path(&scene.path, time).transpose() * by_view.tangent(&view.world_from_camera);
         for (k, gradient) in gaussians.iter().enumerate() {
             colour[k] += gradient.colour;
             mean[k] += gradient.mean;
@@ -156,9 +157,9 @@ fn gradients_are_the_sums_over_the_oracles_views() {
         let largest = want.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
         assert_near(name, got, want, GRADIENT_TOLERANCE * largest);
     }
-    let ends = got.by_ends.start.iter().chain(&got.by_ends.end);
-    for (k, (got, want)) in ends.zip(&by_ends).enumerate() {
-        assert!((got - want).abs() <= GRADIENT_TOLERANCE * by_ends.amax(), "end {k}: {got}, not {want}");
+    let ends = got.by_path.iter();
+    for (k, (got, want)) in ends.zip(&by_path).enumerate() {
+        assert!((got - want).abs() <= GRADIENT_TOLERANCE * by_path.amax(), "end {k}: {got}, not {want}");
     }
 }
 
@@ -200,7 +201,7 @@ fn gradients_are_the_slopes_of_the_loss() {
     smooth_loss(&mut scene);
     let got = scene.exposed(3);
     let path = scene.path;
-    let ends: Vec<f64> = got.by_ends.start.iter().chain(&got.by_ends.end).copied().collect();
+    let ends: Vec<f64> = got.by_path.iter().copied().collect();
     check_slopes("end", &ends, |k, step| {
         scene.path = path.perturbed(&SMatrix::from_fn(|i, _| if i == k { step } else { 0.0 }));
         loss(&scene, 3)
@@ -220,14 +221,15 @@ fn gradients_are_the_slopes_of_the_loss() {
 
 #[test]
 fn one_view_is_plain_rendering_at_mid_exposure() {
-    let scene = Scene::new(4, [60, 40], 50);
+    let mut scene = Scene::new(4, [60, 40], 50);
+    scene.path = ExposurePath::linear(scene.path.ends);
     let view = RasterView { world_from_camera: scene.path.mid(), ..scene.view };
     let by_image = to_image(&scene.view, &scene.by_pixels);
     let plain = Rendered::new(Level::new(), &scene.gaussians, &view, &by_image);
     let exposed = scene.exposed(1);
     assert!(exposed.image == plain.image && exposed.gradients == plain.gradients);
     let by_pose = plain.view.tangent(&view.world_from_camera);
-    let whole = exposed.by_ends.start + exposed.by_ends.end;
+    let whole = exposed.by_path.fixed_rows::<6>(0) + exposed.by_path.fixed_rows::<6>(6);
     assert!((whole - by_pose).amax() <= 1e-9 * by_pose.amax(), "{whole} instead of {by_pose}");
 }
 
@@ -255,9 +257,9 @@ fn used_memory_does_not_matter() {
         renderer.forward(&scene.gaussians, camera, &scene.path, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(count);
         let by_image = to_image(&scene.view, &scene.by_pixels);
-        let by_ends = renderer.backward(&scene.gaussians, &by_image, &mut scratch, &mut gradients);
+        let by_path = renderer.backward(&scene.gaussians, &by_image, &mut scratch, &mut gradients);
         let fresh = scene.exposed(views);
-        assert!(image == fresh.image && gradients == fresh.gradients && by_ends == fresh.by_ends, "{seed}");
+        assert!(image == fresh.image && gradients == fresh.gradients && by_path == fresh.by_path, "{seed}");
         assert!(scratch.drawn_mask() == fresh.drawn, "scene {seed}");
     }
 }
@@ -284,8 +286,8 @@ fn images_of_another_size_give_no_gradient() {
     let RasterView { camera, background, .. } = &scene.view;
     renderer.forward(&scene.gaussians, camera, &scene.path, 3, *background, &mut scratch, &mut image);
     let mut gradients = GaussianGradients::zeros(20);
-    let by_ends =
+    let by_path =
         renderer.backward(&scene.gaussians, &RasterImage::zeros(40, 60), &mut scratch, &mut gradients);
     assert_eq!(gradients, GaussianGradients::zeros(20));
-    assert_eq!(by_ends, ExposureGradient::default());
+    assert_eq!(by_path.norm(), 0.0);
 }

@@ -1,5 +1,6 @@
 //! Helpers shared by the whole-system tests.
 
+pub mod blurred_sequence;
 pub mod handheld;
 pub mod plane_scene;
 pub mod raster_golden;

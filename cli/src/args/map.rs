@@ -59,6 +59,9 @@ pub struct Mapping {
     /// At most this many Gaussians; default: a third of the pixels of an image
     #[arg(long, value_name = "N")]
     pub max_gaussians: Option<NonZeroUsize>,
+    /// Seconds between two checkpoints; 0 for one after every step
+    #[arg(long, value_name = "S", default_value = "20", value_parser = seconds)]
+    pub checkpoint_interval: Duration,
     /// Seed of the order in which keyframes are visited
     #[arg(long, value_name = "N", default_value_t = MapSettings::default().seed)]
     pub seed: u64,
@@ -80,6 +83,7 @@ impl From<&Mapping> for MapSettings {
             max_keyframes: args.max_keyframes.get(),
             max_gaussians: args.max_gaussians.map(NonZeroUsize::get),
             time_budget: args.time_budget,
+            checkpoint_interval: args.checkpoint_interval,
             seed: args.seed,
         }
     }
@@ -94,6 +98,7 @@ impl Default for Mapping {
             virtual_views: None,
             max_keyframes: default_keyframes(),
             max_gaussians: None,
+            checkpoint_interval: MapSettings::default().checkpoint_interval,
             seed: MapSettings::default().seed,
         }
     }
@@ -103,9 +108,14 @@ fn default_keyframes() -> NonZeroUsize {
     NonZeroUsize::new(MapSettings::default().max_keyframes).unwrap_or(NonZeroUsize::MIN)
 }
 
+/// A number of seconds, finite and not negative.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
+    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
+}
+
 /// A positive, finite number of seconds.
 fn positive_seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
-    let duration = Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())?;
+    let duration = seconds(text)?;
     if duration.is_zero() { Err("expected more than 0 seconds".to_owned()) } else { Ok(duration) }
 }

@@ -1,7 +1,7 @@
 //! The run from start to end.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
@@ -12,9 +12,6 @@ use crate::bundle::{BundleAdjustment, BundleState};
 use crate::checkpoint::{Fingerprint, Identity, load, save};
 use crate::dataset::Dataset;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
-
-/// A checkpoint is written when this much time has passed.
-const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
 
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.
 const BUDGET_RESERVE: f64 = 0.1;
@@ -83,8 +80,6 @@ pub fn map_dataset(
     let checkpoint = out.join(CHECKPOINT_FILE);
     let saved: Option<Saved> =
         if resume && checkpoint.is_file() { Some(load(&checkpoint, &identity)?) } else { None };
-    let mut writer = RunWriter::create(out, describe)?;
-    output::push_tracked(&mut writer, &frames)?;
     let mut bundle = prepare::bundle(dataset, &mut frames, settings)?;
     let mut running = Running::default();
     match saved {
@@ -94,6 +89,9 @@ pub fn map_dataset(
     if bundle.state.gaussians.is_empty() {
         return Err(MapError::NoDepth);
     }
+    // Not before it is known that there will be a map: this replaces an earlier one.
+    let mut writer = RunWriter::create(out, describe)?;
+    output::push_tracked(&mut writer, &frames)?;
     let earlier = running.seconds;
     let adjustment = Adjustment { settings, checkpoint: &checkpoint, identity: &identity, started, earlier };
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
@@ -157,7 +155,7 @@ impl Adjustment<'_> {
                 loss: running.loss,
                 psnr: -10.0 * running.mean_square.log10(),
             });
-            if last_saved.elapsed() >= CHECKPOINT_INTERVAL {
+            if last_saved.elapsed() >= self.settings.checkpoint_interval {
                 self.save(bundle, running)?;
                 last_saved = Instant::now();
             }

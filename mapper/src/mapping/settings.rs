@@ -19,6 +19,8 @@ pub struct MapSettings {
     pub max_gaussians: Option<usize>,
     /// Time for all of it; `None` for as many steps as the schedule has, and equal results on all machines of a kind.
     pub time_budget: Option<Duration>,
+    /// Time between two checkpoints; zero for one after every step. It does not change the result.
+    pub checkpoint_interval: Duration,
     /// Seed of the order in which keyframes are visited.
     pub seed: u64,
 }
@@ -31,6 +33,7 @@ impl Default for MapSettings {
             max_keyframes: 100,
             max_gaussians: None,
             time_budget: None,
+            checkpoint_interval: Duration::from_secs(20),
             seed: 1,
         }
     }

@@ -123,18 +123,19 @@ impl RunWriter {
         write_together(&[(self.folder.join(MAP_FILE), format_ply(map))]).map_err(RunError::from_write)
     }
 
-    /// Removes the checkpoint of a run that is finished.
+    /// Removes the checkpoint of a run that is finished, also one that a kill left half written.
     ///
     /// # Errors
     /// [`RunError::Unwritable`].
     pub fn remove_checkpoint(&self) -> Result<(), RunError> {
         let path = self.folder.join(CHECKPOINT_FILE);
-        match fs::remove_file(&path) {
+        let half_written = path.with_added_extension("partial");
+        [path, half_written].iter().try_for_each(|path| match fs::remove_file(path) {
             Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
-                Err(RunError::unwritable(&path, reason))
+                Err(RunError::unwritable(path, reason))
             }
             _ => Ok(()),
-        }
+        })
     }
 
     /// Counts a keyframe whose deblurred image was written.

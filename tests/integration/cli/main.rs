@@ -4,6 +4,7 @@ mod bad_input;
 mod commands;
 mod eval_images;
 mod keyframes;
+mod map;
 mod render;
 
 use std::ffi::OsStr;

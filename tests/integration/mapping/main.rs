@@ -1,0 +1,5 @@
+//! The map of a short blurred sequence, from tracked, true and wrong exposures.
+
+mod quality;
+mod recovery;
+mod settings;

@@ -1,0 +1,152 @@
+//! A short blurred sequence of the generator on the disk, runs to start a map from, and maps of it.
+
+use std::path::{Path, PathBuf};
+
+use mba_mapper::dataset::{self, Dataset};
+use mba_mapper::evaluation::{blur_length, motion_of};
+use mba_mapper::mapping::{MapSettings, map_dataset};
+use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, Summary};
+use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
+use mba_mapper::tracking::{TrackingOptions, track_dataset};
+use mba_mapper::trajectory_file::TimedExposure;
+use tempfile::TempDir;
+
+/// Distance at which blur is measured, metres: about where the generator's room is.
+const DEPTH: f64 = 2.5;
+
+/// A data set in `data` of a temporary folder, which holds the runs too.
+#[derive(Debug)]
+pub struct BlurredSequence {
+    folder: TempDir,
+    /// The data set.
+    pub dataset: Dataset,
+}
+
+impl BlurredSequence {
+    /// Renders a sequence.
+    ///
+    /// # Panics
+    /// When that fails.
+    #[must_use]
+    pub fn new(config: SynthConfig) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let data = folder.path().join("data");
+        let sequence = SynthSequence::new(config).expect("settings in range");
+        write_dataset(&sequence, &data, |_, _| ()).expect("a written sequence");
+        let dataset = dataset::open(&data).expect("a data set");
+        Self { folder, dataset }
+    }
+
+    /// Where something lies in the temporary folder.
+    #[must_use]
+    pub fn path(&self, relative: &str) -> PathBuf {
+        self.folder.path().join(relative)
+    }
+
+    /// The true exposures, one per frame.
+    #[must_use]
+    pub fn truth(&self) -> &[TimedExposure] {
+        self.dataset.ground_truth_exposures()
+    }
+
+    /// A run in the folder `name` that found `exposures`, all of them well.
+    ///
+    /// # Panics
+    /// When it cannot be written.
+    #[must_use]
+    pub fn run_of(&self, name: &str, exposures: &[TimedExposure]) -> Run {
+        let folder = self.path(name);
+        let mut writer = RunWriter::create(&folder, self.describe()).expect("a run");
+        for exposure in exposures {
+            writer.push(*exposure, self.record(exposure)).expect("a frame");
+        }
+        writer.finish(|_| ()).expect("a finished run");
+        Run::open(&folder).expect("a run")
+    }
+
+    /// The tracker's run in the folder `name`.
+    ///
+    /// # Panics
+    /// When tracking fails.
+    #[must_use]
+    pub fn track(&self, name: &str) -> Run {
+        let folder = self.path(name);
+        let mut writer = RunWriter::create(&folder, self.describe()).expect("a run");
+        track_dataset(&self.dataset, &TrackingOptions::default(), &mut writer, |_| ()).expect("tracked");
+        writer.finish(|_| ()).expect("a finished run");
+        Run::open(&folder).expect("a run")
+    }
+
+    /// Maps the sequence from `run` into the folder `name`.
+    ///
+    /// # Panics
+    /// When mapping fails.
+    pub fn map(&self, run: &Run, name: &str, settings: &MapSettings) -> Summary {
+        let out = self.path(name);
+        map_dataset(&self.dataset, run, settings, &out, false, self.describe(), |_| ()).expect("a map")
+    }
+
+    fn describe(&self) -> RunSettings {
+        RunSettings {
+            program: "test".to_owned(),
+            dataset: self.dataset.folder().display().to_string(),
+            frame_rate: self.dataset.calibration().frame_rate,
+            camera: Some(self.dataset.calibration().into()),
+            options: serde_json::Map::new(),
+        }
+    }
+
+    fn record(&self, exposure: &TimedExposure) -> FrameRecord {
+        FrameRecord {
+            timestamp: exposure.timestamp,
+            status: FrameStatus::Ok,
+            keyframe: 0,
+            ms: 1.0,
+            blur_px: blur_length(&motion_of(exposure), &self.dataset.calibration().camera, DEPTH),
+            virtual_views: 9,
+            iterations: 9,
+            residual: 0.01,
+            inliers: 1.0,
+            gain: 1.0,
+        }
+    }
+}
+
+/// Content of a file.
+///
+/// # Panics
+/// When it cannot be read.
+#[must_use]
+pub fn bytes(path: &Path) -> Vec<u8> {
+    std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// Names of the files in a folder, sorted.
+///
+/// # Panics
+/// When it cannot be read.
+#[must_use]
+pub fn names(folder: &Path) -> Vec<String> {
+    let files = std::fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
+    let name = |file: std::io::Result<std::fs::DirEntry>| {
+        file.expect("an entry").file_name().to_string_lossy().into_owned()
+    };
+    let mut names: Vec<String> = files.map(name).collect();
+    names.sort();
+    names
+}
+
+/// Asserts that two maps have the same files, bit for bit, in all that does not tell how long it took.
+///
+/// # Panics
+/// When they differ.
+pub fn assert_same_map(one: &Path, two: &Path) {
+    let mut files: Vec<PathBuf> = ["map.ply", "exposures.txt", "trajectory.txt"].map(PathBuf::from).into();
+    for images in ["deblurred", "depth"] {
+        assert_eq!(names(&one.join(images)), names(&two.join(images)));
+        files.extend(names(&one.join(images)).iter().map(|name| Path::new(images).join(name)));
+    }
+    for file in files {
+        assert!(bytes(&one.join(&file)) == bytes(&two.join(&file)), "{} differs", file.display());
+    }
+}

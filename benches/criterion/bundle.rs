@@ -14,7 +14,7 @@ fn steps(c: &mut Criterion) {
     group.throughput(Throughput::Elements(VIEWS as u64));
     for [width, height] in SIZES {
         let mut input = BundleInput::room(Level::new(), width, height).expect("a valid size");
-        println!("{width}x{height}: {} Gaussians", input.gaussians());
+        println!("{width}x{height}: {} keyframes, {} Gaussians", input.keyframes(), input.gaussians());
         for threads in [1, 2] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
             let id = BenchmarkId::new(format!("{width}x{height}"), threads);

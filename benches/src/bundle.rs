@@ -13,14 +13,20 @@ use mba_tracker::simd::Level;
 /// Virtual views of every step: the frames are blurred enough for more.
 pub const VIEWS: usize = 5;
 
-/// Keyframes of the bundle.
-const KEYFRAMES: usize = 4;
+/// Frames of the sequence; those with enough blur become keyframes.
+const FRAMES: usize = 8;
 
-/// Mean blur, pixels: the stages that [`POSITION`] stands for would take one view per 4 of them.
+/// Mean blur of the sequence, pixels.
 const BLUR_PX: f64 = 24.0;
 
-/// Where the schedule stays: full resolution, paths move.
+/// Blur of every keyframe at the least, pixels: at full resolution there is a view per 4 of them.
+const KEYFRAME_BLUR_PX: f64 = 18.0;
+
+/// Where the schedule stays: full resolution, paths move, the density is final.
 const POSITION: f64 = 0.7;
+
+/// Steps on the way there, in which the map grows.
+const GROWING: usize = 48;
 
 /// Frames with true paths and the map they seed.
 pub struct BundleInput {
@@ -28,16 +34,23 @@ pub struct BundleInput {
 }
 
 impl BundleInput {
-    /// Renders the frames and seeds the map with as many Gaussians as a third of the pixels of an image.
+    /// Renders the frames, seeds the map, and lets it grow up to a Gaussian per three pixels of an image.
     ///
     /// # Errors
     /// [`SynthError`] when the generator refuses the size.
     pub fn room(level: Level, width: usize, height: usize) -> Result<Self, SynthError> {
-        let config =
-            SynthConfig { frames: KEYFRAMES, width, height, mean_blur_px: BLUR_PX, ..SynthConfig::default() };
+        let config = SynthConfig {
+            frames: FRAMES,
+            width,
+            height,
+            exposure_seconds: 0.03,
+            mean_blur_px: BLUR_PX,
+            ..SynthConfig::default()
+        };
         let sequence = SynthSequence::new(config)?;
         let sensor = sensor(&sequence);
-        let frames: Vec<_> = (0..KEYFRAMES).map(|index| sequence.render_frame(index)).collect();
+        let blurred = |index: &usize| sequence.blur(*index).mean_px > KEYFRAME_BLUR_PX;
+        let frames: Vec<_> = (0..FRAMES).filter(blurred).map(|index| sequence.render_frame(index)).collect();
         let states =
             frames.iter().map(|frame| FrameState::new(ExposurePath::linear(frame.exposure))).collect();
         let keyframes =
@@ -46,8 +59,16 @@ impl BundleInput {
             BundleSettings { blur: true, max_views: VIEWS, max_gaussians: width * height / 3, seed: 1 };
         let mut bundle = BundleAdjustment::new(level, sensor, settings, keyframes, states);
         bundle.seed();
-        bundle.state.position = POSITION;
+        for k in 1..=GROWING {
+            bundle.step(false, |_| POSITION * k as f64 / GROWING as f64);
+        }
         Ok(Self { bundle })
+    }
+
+    /// Keyframes that are visited in turn.
+    #[must_use]
+    pub fn keyframes(&self) -> usize {
+        self.bundle.keyframes().len()
     }
 
     /// Gaussians in the map.

@@ -127,10 +127,12 @@ impl DisplayPlanes {
             let rows = self.rows(channel, image.width, image.height);
             let (light, bytes) = (&image.colour[channel], &seen.colour[channel]);
             let given = (light.par_chunks(image.width), bytes.par_chunks(image.width));
-            let compare = |(y, (mut row, (light, bytes))): (usize, (Row<'_>, (&[f32], &[u8])))| {
-                row.compare(curve, gain, light, bytes, columns(y), weight * share)
-            };
-            let of_rows: Vec<[f32; 2]> = rows.zip(given).enumerate().map(compare).collect();
+            let rows = rows.zip(given).enumerate();
+            let of_rows: Vec<[f32; 2]> = rows
+                .map(|(y, (mut row, (light, bytes)))| {
+                    row.compare(curve, gain, light, bytes, columns(y), weight * share)
+                })
+                .collect();
             for row in of_rows {
                 sums.iter_mut().zip(row).for_each(|(sum, row)| *sum += f64::from(row));
             }

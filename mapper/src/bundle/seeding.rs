@@ -52,7 +52,6 @@ fn depth_to_seed(seen: &Observation, source: DepthSource) -> Vec<f32> {
 /// colour and depth, unless the middle of the square is covered according to `alpha` (row by row, as large as `seen`).
 ///
 /// Adds at most `room` and returns how many.
-#[expect(clippy::too_many_arguments, reason = "what is seen, from where, and what is there already")]
 pub(super) fn seed(
     gaussians: &mut Gaussians,
     seen: &Observation,

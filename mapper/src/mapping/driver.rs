@@ -44,7 +44,7 @@ struct Saved {
     running: Running,
 }
 
-/// What the driver keeps of the steps.
+/// What the driver keeps of the steps: seconds for the map so far, and smoothed figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Running {
     seconds: f64,
@@ -95,8 +95,23 @@ pub fn map_dataset(
     let earlier = running.seconds;
     let adjustment = Adjustment { settings, checkpoint: &checkpoint, identity: &identity, started, earlier };
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
-    frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
+    running.seconds = adjustment.seconds();
+    let summary = conclude(dataset, bundle, frames, settings, writer, running)?;
+    RunWriter::remove_checkpoint(out)?;
+    Ok(summary)
+}
 
+/// Fits the frames between keyframes to the finished map, repairs what is left, and writes everything.
+fn conclude(
+    dataset: &Dataset,
+    mut bundle: BundleAdjustment,
+    mut frames: Frames,
+    settings: &MapSettings,
+    mut writer: RunWriter,
+    running: Running,
+) -> Result<Summary, MapError> {
+    let started = Instant::now();
+    frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
     let refined = all_exposures(dataset, &mut bundle, &frames, settings);
     let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
     let (exposures, repairs) = frames.repair(dataset, &exposures)?;
@@ -106,19 +121,19 @@ pub fn map_dataset(
     let figures = MapFigures {
         gaussians: bundle.state.gaussians.len(),
         iterations: bundle.state.steps,
-        seconds: earlier + started.elapsed().as_secs_f64(),
+        seconds: running.seconds + started.elapsed().as_secs_f64(),
         peak_memory_bytes: output::peak_memory_bytes(),
         loss: running.loss,
         keyframes: bundle.keyframes().len(),
         ..merit::image_figures(dataset, &bundle, writer.folder(), &exposures)
     };
-    writer.remove_checkpoint()?;
     let merit = Merit::of(&exposures, dataset);
-    Ok(writer.finish(|summary| {
+    let summary = writer.finish(|summary| {
         summary.trajectory = merit.trajectory;
         summary.blur = merit.blur;
         summary.map = Some(figures);
-    })?)
+    })?;
+    Ok(summary)
 }
 
 /// The loop of steps and what belongs to it.

@@ -123,12 +123,12 @@ impl RunWriter {
         write_together(&[(self.folder.join(MAP_FILE), format_ply(map))]).map_err(RunError::from_write)
     }
 
-    /// Removes the checkpoint of a run that is finished, also one that a kill left half written.
+    /// Removes the checkpoint of the finished run in `folder`, also one that a kill left half written.
     ///
     /// # Errors
     /// [`RunError::Unwritable`].
-    pub fn remove_checkpoint(&self) -> Result<(), RunError> {
-        let path = self.folder.join(CHECKPOINT_FILE);
+    pub fn remove_checkpoint(folder: &Path) -> Result<(), RunError> {
+        let path = folder.join(CHECKPOINT_FILE);
         let half_written = path.with_added_extension("partial");
         [path, half_written].iter().try_for_each(|path| match fs::remove_file(path) {
             Err(reason) if reason.kind() != io::ErrorKind::NotFound => {

@@ -111,11 +111,16 @@ impl<'a> ViewRenderer<'a> {
     }
 }
 
+/// How much of what is behind is seen. A map is fitted in front of black, so its light is whole wherever it is solid.
+fn share_behind(alpha: f32) -> f32 {
+    (1.0 - alpha / SOLID_ALPHA).max(0.0)
+}
+
 /// Multiplies the light by `gain` and puts it in front of a captured image; nothing happens for one of another size.
 fn put_in_front(image: &mut RasterImage, inverse: &InverseResponse, captured: &[Vec<u8>; 3], gain: f32) {
     for (plane, captured) in image.colour.iter_mut().zip(captured) {
         for ((light, alpha), byte) in plane.iter_mut().zip(&image.alpha).zip(captured) {
-            *light = gain * *light + (1.0 - alpha) * inverse.linear_light(*byte);
+            *light = gain * *light + share_behind(*alpha) * inverse.linear_light(*byte);
         }
     }
 }
@@ -123,14 +128,12 @@ fn put_in_front(image: &mut RasterImage, inverse: &InverseResponse, captured: &[
 /// Completes the colours where the map is not solid from where it is.
 fn fill_holes(image: &mut RasterImage) {
     let RasterImage { width, colour, alpha, .. } = image;
-    let weights: Vec<f32> =
-        alpha.iter().map(|alpha| if *alpha > SOLID_ALPHA { *alpha } else { 0.0 }).collect();
+    let known: Vec<f32> = alpha.iter().map(|alpha| if *alpha > SOLID_ALPHA { 1.0 } else { 0.0 }).collect();
     colour.par_iter_mut().for_each(|plane| {
-        // What lies in front of nothing is the colour times alpha.
-        let mut behind: Vec<f32> = plane.iter().zip(&*alpha).map(|(light, alpha)| light / alpha).collect();
-        infill::fill(*width, &mut behind, &weights);
+        let mut behind = plane.clone();
+        infill::fill(*width, &mut behind, &known);
         for ((light, alpha), behind) in plane.iter_mut().zip(&*alpha).zip(behind) {
-            *light += (1.0 - alpha) * behind;
+            *light += share_behind(*alpha) * behind;
         }
     });
 }
@@ -203,5 +206,30 @@ mod tests {
         assert_eq!(image::open(&colour).unwrap().into_rgb8().into_raw(), view.rgb);
         assert_eq!(image::open(&depth).unwrap().into_luma16().into_raw(), view.depth);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2, "no partial file is left");
+    }
+
+    #[test]
+    fn what_is_behind_is_seen_where_the_map_is_thin_and_nowhere_else() {
+        let (width, height) = (33, 25);
+        let camera = PinholeCamera { width, height, fx: 100.0, fy: 100.0, cx: 16.0, cy: 12.0 };
+        let ball = Gaussian {
+            mean: [0.0, 0.0, 3.0],
+            log_scale: [0.1_f32.ln(); 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity_logit: 2.0,
+            colour: [0.5; 3],
+        };
+        let map: Gaussians = [ball].into_iter().collect();
+        let mut renderer = ViewRenderer::new(&map, camera, &InverseResponse::linear(), 5000.0);
+        let pose = RigidTransform::identity();
+        let captured = [const { 90 }; 3].map(|byte| vec![byte; width * height]);
+        let [black, filled, in_front] =
+            [Behind::Black, Behind::Surroundings, Behind::Captured { colour: &captured, gain: 2.0 }]
+                .map(|behind| renderer.render(&pose, behind).rgb);
+        let centre = 3 * (12 * width + 16);
+        // sigmoid(2) 0.5 is 0.4404 of full scale; the gain doubles it, and nothing behind adds to it.
+        assert_eq!((black[centre], filled[centre], in_front[centre]), (112, 112, 225));
+        assert_eq!((black[0], in_front[0]), (0, 90));
+        assert!((56..=112).contains(&filled[0]), "a corner has the light of the ball: {}", filled[0]);
     }
 }

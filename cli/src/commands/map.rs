@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
+use mba_mapper::checkpoint::CheckpointError;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
-use mba_mapper::run::{Run, RunCamera, RunError, RunSettings, Summary};
+use mba_mapper::run::{Run, RunCamera, RunSettings, Summary};
 use serde_json::json;
 
 use super::open;
 use crate::args::BlurMode;
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
-use crate::failure::OrBadInput;
+use crate::failure::{OrBadInput, is_disk_full};
 use crate::report::table;
 
 /// Steps of the progress bar: positions are shares, not counts.
@@ -84,6 +85,14 @@ fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
 
 /// Advice for what the user can repair.
 fn advise(error: MapError) -> anyhow::Result<Summary> {
+    let disk_is_full = match &error {
+        MapError::Run(error) => is_disk_full(error),
+        MapError::Checkpoint(CheckpointError::File(error)) => is_disk_full(error),
+        _ => false,
+    };
+    if disk_is_full {
+        return Err(error.into());
+    }
     let hint = match &error {
         MapError::Frames { .. } | MapError::Timestamp { .. } => {
             "give the RUN folder that `mba track` wrote for this data set"
@@ -94,7 +103,6 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
             "start without --resume, or with the inputs and options of the stopped run"
         }
         MapError::Continuity(_) => "track the data set again",
-        MapError::Run(RunError::DiskFull { .. }) => return Err(error.into()),
         _ => "name a folder for --out that can be created or written",
     };
     Err(error).or_bad_input(hint)

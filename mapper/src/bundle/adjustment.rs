@@ -197,19 +197,26 @@ impl BundleAdjustment {
         Some(StepReport { keyframe: k, terms: loss.terms })
     }
 
-    /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution.
+    /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution, of
+    /// which the one with the least loss is kept: steps have a length of their own, and would lead away from a path
+    /// that is right already.
     pub fn fit_frame(&mut self, unmapped: &Keyframe, frame: &mut FrameState, count: usize) {
         let plan = StepPlan { level: 1, spacing: 2.0, ..self.schedule.plan(0.1, false) };
         let seen = unmapped.observation.level(plan.level);
+        let (mut best, mut least) = (frame.clone(), f64::INFINITY);
         for k in 0..count {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
             let views = self.settings.views(frame.blur_px(&seen.camera, unmapped.depth), &plan);
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
             let loss = self.engine.evaluate(&self.state.gaussians, exposure, &plan);
+            if loss.terms.total() < least {
+                (best, least) = (frame.clone(), loss.terms.total());
+            }
             let step = PathStep { pixels: 0.3 * shrink, hold_middle: false, still: !self.settings.blur };
             frame.path_moments.step(&mut frame.path, &loss.by_path, &unmapped.prior, &unmapped.metric, step);
             frame.log_gain += frame.gain_moments.step(loss.by_log_gain, 0.01 * shrink);
         }
+        *frame = best;
     }
 
     /// The next keyframe of a random order in which every keyframe comes once per round.

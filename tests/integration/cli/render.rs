@@ -91,7 +91,7 @@ fn colours(path: &Path) -> RgbImage {
 #[test]
 fn views_have_colour_and_depth_where_the_map_is() {
     let place = workplace(Some(camera()));
-    let figures = render(place.path(), "poses.txt", "views", &["--threads", "1"]).json();
+    let figures = render(place.path(), "poses.txt", "views", &["--threads", "1", "--fill", "off"]).json();
     assert_eq!((&figures["views"], &figures["gaussians"]), (&FRAMES.into(), &BALLS.len().into()));
     let depth = |frame: usize| {
         let path = place.path().join(format!("views/depth/{frame:06}.png"));
@@ -119,7 +119,8 @@ fn views_have_colour_and_depth_where_the_map_is() {
     let share = solid as f64 / (FRAMES * 161 * 121) as f64;
     assert!((figures["solid_share"].as_f64().unwrap() - share).abs() < 1e-12, "{figures}");
 
-    assert_eq!(render(place.path(), "poses.txt", "two", &["--threads", "2"]).code, Some(0));
+    let two = render(place.path(), "poses.txt", "two", &["--threads", "2", "--fill", "off"]);
+    assert_eq!(two.code, Some(0));
     for name in ["000004.png", "depth/000004.png"] {
         let [one, two] = ["views", "two"].map(|out| fs::read(place.path().join(out).join(name)).unwrap());
         assert!(one == two, "{name} depends on the number of threads");

@@ -97,6 +97,9 @@ pub struct StepReport {
     pub terms: LossTerms,
 }
 
+/// Blur up to this length, pixels, is not seen in a picture: one view shows it.
+const SHARP_PX: f64 = 1.0;
+
 /// Longest growth of the map at one change of density, as a fraction of its size.
 const GROWTH: f64 = 0.15;
 
@@ -182,8 +185,9 @@ impl BundleAdjustment {
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
         if plan.path_pixels > 0.0 {
-            let step =
-                PathStep { pixels: plan.path_pixels, hold_middle: is_first, still: !self.settings.blur };
+            // One view says nothing about the motion.
+            let still = !self.settings.blur || views == 1;
+            let step = PathStep { pixels: plan.path_pixels, hold_middle: is_first, still };
             frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, &keyframe.metric, step);
             if !is_first {
                 frame.log_gain += frame.gain_moments.step(loss.by_log_gain, plan.log_gain);
@@ -252,7 +256,8 @@ impl BundleSettings {
     fn views(&self, blur_px: f64, plan: &StepPlan) -> usize {
         let most = if self.blur { plan.max_views.min(self.max_views) } else { 1 };
         // Casts saturate. An even bound gives the odd number below.
-        let wanted = ((blur_px / plan.spacing).ceil() as usize).max(1) | 1;
+        let least = if blur_px > SHARP_PX { 3 } else { 1 };
+        let wanted = ((blur_px / plan.spacing).ceil() as usize).max(least) | 1;
         wanted.min(most.saturating_sub(1) | 1)
     }
 }

@@ -5,10 +5,11 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
-use super::adam::{self, Moments};
-use super::density::{self, Pull};
+use super::adam;
+use super::density;
 use super::engine::{Engine, Exposure};
 use super::frame_state::FrameState;
+use super::ledger::Ledger;
 use super::loss::LossTerms;
 use super::observation::{Observation, ObservationPyramid, Sensor};
 use super::path_metric::PathMetric;
@@ -61,10 +62,8 @@ impl Keyframe {
 pub struct BundleState {
     /// The map.
     pub gaussians: Gaussians,
-    /// Moments of its gradients.
-    moments: Moments,
-    /// Pulls since the last change of density.
-    pull: Pull,
+    /// What is kept of every Gaussian besides.
+    ledger: Ledger,
     /// One per keyframe.
     pub frames: Vec<FrameState>,
     /// Steps made.
@@ -84,6 +83,8 @@ pub struct BundleAdjustment {
     sensor: Sensor,
     level: Level,
     engine: Engine,
+    /// Memory for rendering what is covered.
+    seeding: (RasterScratch, RasterImage),
     /// Order of the visits of the current round, and which round that is.
     round: (usize, Vec<usize>),
 }
@@ -93,6 +94,8 @@ pub struct BundleAdjustment {
 pub struct StepReport {
     /// The keyframe, counted from 0.
     pub keyframe: usize,
+    /// Virtual views that were rendered.
+    pub views: usize,
     /// Loss before the step.
     pub terms: LossTerms,
 }
@@ -119,13 +122,14 @@ impl BundleAdjustment {
         let schedule = Schedule::new(keyframes.len());
         let state = BundleState {
             gaussians: Gaussians::default(),
-            moments: Moments::default(),
-            pull: Pull::default(),
+            ledger: Ledger::default(),
             frames,
             steps: 0,
             position: 0.0,
         };
-        Self { state, keyframes, settings, schedule, sensor, level, engine, round: (usize::MAX, Vec::new()) }
+        let seeding = Default::default();
+        let round = (usize::MAX, Vec::new());
+        Self { state, keyframes, settings, schedule, sensor, level, engine, seeding, round }
     }
 
     /// The keyframes.
@@ -140,28 +144,57 @@ impl BundleAdjustment {
         &self.schedule
     }
 
+    /// Adds a keyframe with a first estimate of its state, the last in order.
+    pub fn push(&mut self, keyframe: Keyframe, frame: FrameState) {
+        self.keyframes.push(keyframe);
+        self.state.frames.push(frame);
+    }
+
+    /// Takes keyframe `k` out; what the map learnt from it stays. Returns `None` if there is no such keyframe.
+    pub fn retire(&mut self, k: usize) -> Option<(Keyframe, FrameState)> {
+        let both = k < self.keyframes.len().min(self.state.frames.len());
+        both.then(|| (self.keyframes.remove(k), self.state.frames.remove(k)))
+    }
+
+    /// Starts another schedule at its beginning.
+    pub fn start(&mut self, schedule: Schedule) {
+        self.schedule = schedule;
+        self.state.position = 0.0;
+    }
+
+    /// Allows up to so many Gaussians from now on.
+    pub fn allow(&mut self, max_gaussians: usize) {
+        self.settings.max_gaussians = max_gaussians;
+    }
+
     /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,
     /// once more, surfaces that no keyframe has a depth of.
     pub fn seed(&mut self) {
-        let camera = self.sensor.camera;
-        let blur = |k: &usize| self.state.frames[*k].blur_px(&camera, self.keyframes[*k].depth);
         let mut order: Vec<usize> = (0..self.keyframes.len()).collect();
-        order.sort_by(|a, b| blur(a).total_cmp(&blur(b)));
-        let rasterizer = Rasterizer::new(self.level);
-        let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
+        order.sort_by(|a, b| self.blur_px(*a).total_cmp(&self.blur_px(*b)));
         for source in [DepthSource::Measured, DepthSource::Completed] {
             for &k in &order {
-                let seen = self.keyframes[k].observation.level(0);
-                let world_from_camera = self.state.frames[k].path.mid();
-                let view = RasterView { camera: seen.camera, world_from_camera, background: [0.0; 3] };
-                rasterizer.forward(&self.state.gaussians, &view, &mut scratch, &mut image);
-                let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
-                let (map, response) = (&mut self.state.gaussians, &self.sensor.inverse_response);
-                seeding::seed(map, seen, response, &world_from_camera, &image.alpha, source, room);
+                self.seed_from(k, source);
             }
         }
-        density::resize(&mut self.state.moments, self.state.gaussians.len());
         self.reorder();
+    }
+
+    /// Adds what keyframe `k` sees and the map does not cover. Returns the share (0 to 1) of the picture that was not
+    /// covered.
+    pub fn seed_from(&mut self, k: usize, source: DepthSource) -> f64 {
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let seen = keyframe.observation.level(0);
+        let world_from_camera = frame.path.mid();
+        let view = RasterView { camera: seen.camera, world_from_camera, background: [0.0; 3] };
+        let (scratch, image) = (&mut self.seeding.0, &mut self.seeding.1);
+        Rasterizer::new(self.level).forward(&self.state.gaussians, &view, scratch, image);
+        let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
+        let (map, response) = (&mut self.state.gaussians, &self.sensor.inverse_response);
+        seeding::seed(map, seen, response, &world_from_camera, &image.alpha, source, room);
+        self.state.ledger.enrol(self.state.gaussians.len(), keyframe.index);
+        let open = image.alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
+        open as f64 / image.alpha.len().max(1) as f64
     }
 
     /// One step on the next keyframe, after which the schedule stands at `position_after`. `timed` says whether
@@ -171,17 +204,27 @@ impl BundleAdjustment {
     pub fn step(&mut self, timed: bool, position_after: impl FnOnce(&Schedule) -> f64) -> Option<StepReport> {
         let k = self.next_keyframe()?;
         let plan = self.schedule.plan(self.state.position, timed);
+        let report = self.visit(k, &plan);
+        let before = core::mem::replace(&mut self.state.position, position_after(&self.schedule));
+        if self.schedule.density_changes(before, self.state.position) {
+            self.change_density();
+        }
+        Some(report)
+    }
+
+    /// One step on keyframe `k`, which must be one.
+    pub fn visit(&mut self, k: usize, plan: &StepPlan) -> StepReport {
         let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
         let seen = keyframe.observation.level(plan.level);
-        let views = self.settings.views(frame.blur_px(&seen.camera, keyframe.depth), &plan);
+        let views = self.settings.views(frame.blur_px(&seen.camera, keyframe.depth), plan);
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-        let loss = self.engine.evaluate(&self.state.gaussians, exposure, &plan);
+        let loss = self.engine.evaluate(&self.state.gaussians, exposure, plan);
 
-        let state = &mut self.state;
+        let BundleState { gaussians, ledger, frames, steps, .. } = &mut self.state;
         let (gradients, drawn) = (self.engine.gradients(), self.engine.drawn());
-        adam::step(&mut state.gaussians, &gradients.parameters, drawn, &plan.lengths, &mut state.moments);
-        state.pull.add(&gradients.screen, drawn);
-        let frame = &mut state.frames[k];
+        adam::step(gaussians, &gradients.parameters, drawn, &plan.lengths, &mut ledger.moments);
+        ledger.pull.add(&gradients.screen, drawn);
+        let frame = &mut frames[k];
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
         if plan.path_pixels > 0.0 {
@@ -193,12 +236,9 @@ impl BundleAdjustment {
                 frame.log_gain += frame.gain_moments.step(loss.by_log_gain, plan.log_gain);
             }
         }
-        state.steps += 1;
-        let before = core::mem::replace(&mut state.position, position_after(&self.schedule));
-        if self.schedule.density_changes(before, self.state.position) {
-            self.change_density();
-        }
-        Some(StepReport { keyframe: k, terms: loss.terms })
+        frame.visits += 1;
+        *steps += 1;
+        StepReport { keyframe: k, views, terms: loss.terms }
     }
 
     /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution, of
@@ -233,21 +273,27 @@ impl BundleAdjustment {
         self.round.1.get(place).copied()
     }
 
-    fn change_density(&mut self) {
-        let state = &mut self.state;
-        let count = state.gaussians.len();
+    /// Divides Gaussians that are torn between pixels, removes useless ones, and puts the others in order.
+    pub fn change_density(&mut self) {
+        let BundleState { gaussians, ledger, .. } = &mut self.state;
+        let count = gaussians.len();
         let room = self.settings.max_gaussians.saturating_sub(count).min((GROWTH * count as f64) as usize);
-        density::divide(&mut state.gaussians, &mut state.moments, &state.pull, room);
-        density::prune(&mut state.gaussians, &mut state.moments);
+        density::divide(gaussians, ledger, room);
+        density::prune(gaussians, ledger);
         self.reorder();
     }
 
     /// Puts neighbours in space next to each other in memory.
     fn reorder(&mut self) {
-        let state = &mut self.state;
-        let order = density::morton_order(&state.gaussians);
-        density::select(&mut state.gaussians, &mut state.moments, &order);
-        state.pull = Pull::zeros(state.gaussians.len());
+        let BundleState { gaussians, ledger, .. } = &mut self.state;
+        let order = density::morton_order(gaussians);
+        density::select(gaussians, ledger, &order);
+    }
+
+    /// Length of the blur of keyframe `k`, full-resolution pixels.
+    #[must_use]
+    pub fn blur_px(&self, k: usize) -> f64 {
+        self.state.frames[k].blur_px(&self.sensor.camera, self.keyframes[k].depth)
     }
 }
 

@@ -2,10 +2,7 @@
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use serde::{Deserialize, Serialize};
-
-use super::adam::Moments;
-use crate::checkpoint::exact_floats;
+use super::ledger::Ledger;
 use crate::gaussians::{Gaussian, Gaussians};
 
 /// Gaussians fainter than this are removed.
@@ -17,41 +14,10 @@ const OFFSET: f32 = 0.7;
 /// Factor on the longest standard deviation of a child.
 const SHRINK: f32 = 0.6;
 
-/// How strongly the views pull at every Gaussian, since the last change of density.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Pull {
-    /// Sum of lengths of gradients by the projected centre.
-    #[serde(with = "exact_floats")]
-    pub(super) sum: Vec<f32>,
-    /// Number of exposures that drew it.
-    pub(super) drawn: Vec<u32>,
-}
-
-impl Pull {
-    /// No pull on `count` Gaussians.
-    #[must_use]
-    pub(super) fn zeros(count: usize) -> Self {
-        Self { sum: vec![0.0; count], drawn: vec![0; count] }
-    }
-
-    /// Adds the pulls of an exposure.
-    pub(super) fn add(&mut self, screen: &[f32], is_drawn: &[bool]) {
-        let own = self.sum.iter_mut().zip(&mut self.drawn);
-        for ((sum, drawn), (screen, _)) in own.zip(screen.iter().zip(is_drawn)).filter(|(_, (_, is))| **is) {
-            *sum += screen;
-            *drawn += 1;
-        }
-    }
-
-    fn mean(&self, i: usize) -> f32 {
-        if self.drawn[i] == 0 { 0.0 } else { self.sum[i] / self.drawn[i] as f32 }
-    }
-}
-
 /// Divides up to `room` Gaussians that are pulled, those with the largest first. Returns how many.
-pub(super) fn divide(gaussians: &mut Gaussians, moments: &mut Moments, pull: &Pull, room: usize) -> usize {
+pub(super) fn divide(gaussians: &mut Gaussians, ledger: &mut Ledger, room: usize) -> usize {
     let mut torn: Vec<(f32, usize)> =
-        (0..gaussians.len()).map(|i| (pull.mean(i), i)).filter(|(mean, _)| *mean > 0.0).collect();
+        (0..gaussians.len()).map(|i| (ledger.pull.mean(i), i)).filter(|(mean, _)| *mean > 0.0).collect();
     torn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     torn.truncate(room);
     for &(_, i) in &torn {
@@ -59,9 +25,8 @@ pub(super) fn divide(gaussians: &mut Gaussians, moments: &mut Moments, pull: &Pu
         let [one, other] = children(&parent);
         gaussians.set(i, &one);
         gaussians.push(&other);
-        forget(moments, i);
+        ledger.divided(i);
     }
-    resize(moments, gaussians.len());
     torn.len()
 }
 
@@ -79,7 +44,7 @@ fn children(parent: &Gaussian) -> [Gaussian; 2] {
 }
 
 /// Removes Gaussians that are faint, huge or not finite. Returns how many.
-pub(super) fn prune(gaussians: &mut Gaussians, moments: &mut Moments) -> usize {
+pub(super) fn prune(gaussians: &mut Gaussians, ledger: &mut Ledger) -> usize {
     let before = gaussians.len();
     let faint = (FAINT / (1.0 - FAINT)).ln();
     let keep: Vec<usize> = (0..before)
@@ -91,17 +56,14 @@ pub(super) fn prune(gaussians: &mut Gaussians, moments: &mut Moments) -> usize {
             })
         })
         .collect();
-    select(gaussians, moments, &keep);
+    select(gaussians, ledger, &keep);
     before - keep.len()
 }
 
 /// Makes Gaussian `keep[i]` the new Gaussian i; indices beyond the set are left out.
-pub(super) fn select(gaussians: &mut Gaussians, moments: &mut Moments, keep: &[usize]) {
-    let pick = |set: &Gaussians| keep.iter().filter_map(|&i| set.get(i)).collect::<Gaussians>();
-    *gaussians = pick(gaussians);
-    moments.first = pick(&moments.first);
-    moments.second = pick(&moments.second);
-    moments.updates = keep.iter().filter_map(|&i| moments.updates.get(i).copied()).collect();
+pub(super) fn select(gaussians: &mut Gaussians, ledger: &mut Ledger, keep: &[usize]) {
+    *gaussians = gaussians.select(keep);
+    ledger.select(keep);
 }
 
 /// Order of the Gaussians along a Z-curve (Morton 1966) through their bounding box, 10 bits per axis: neighbours in
@@ -134,20 +96,6 @@ fn spread(x: u32) -> u32 {
     (x | x << 2) & 0x0924_9249
 }
 
-/// A Gaussian that was changed at one go starts without moments.
-fn forget(moments: &mut Moments, i: usize) {
-    moments.first.set(i, &Gaussian::default());
-    moments.second.set(i, &Gaussian::default());
-    moments.updates[i] = 0;
-}
-
-/// Makes room for the moments of `count` Gaussians.
-pub(super) fn resize(moments: &mut Moments, count: usize) {
-    moments.first.resize(count);
-    moments.second.resize(count);
-    moments.updates.resize(count, 0);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,24 +105,26 @@ mod tests {
         Gaussian { mean, log_scale, rotation: [1.0, 0.0, 0.0, 0.0], opacity_logit, colour: [0.5; 3] }
     }
 
-    fn moments(count: usize) -> Moments {
-        Moments { first: Gaussians::zeros(count), second: Gaussians::zeros(count), updates: vec![3; count] }
+    fn ledger(count: usize) -> Ledger {
+        let mut ledger = Ledger::default();
+        ledger.enrol(count, 0);
+        ledger.moments.updates.fill(3);
+        ledger
     }
 
     #[test]
     fn the_most_torn_is_divided_along_its_longest_axis() {
         let mut map: Gaussians = [0.0, 1.0, 2.0].map(|x| gaussian([x, 0.0, 0.0], 1.0)).into_iter().collect();
-        let mut moments = moments(3);
-        let mut pull = Pull::zeros(3);
+        let mut ledger = ledger(3);
         // The second is pulled less in all, but only seen once.
-        pull.add(&[1.0, 1.8, 0.5], &[true, true, true]);
-        pull.add(&[1.0, 9.0, 0.5], &[true, false, true]);
-        assert_eq!(divide(&mut map, &mut moments, &pull, 1), 1);
-        assert_eq!((map.len(), moments.updates.len()), (4, 4));
+        ledger.pull.add(&[1.0, 1.8, 0.5], &[true, true, true]);
+        ledger.pull.add(&[1.0, 9.0, 0.5], &[true, false, true]);
+        assert_eq!(divide(&mut map, &mut ledger, 1), 1);
+        assert_eq!((map.len(), ledger.moments.updates.len()), (4, 4));
         let [one, other] = [1, 3].map(|i| map.get(i).unwrap());
         assert!((one.mean[1] + 0.07).abs() < 1e-6 && (other.mean[1] - 0.07).abs() < 1e-6);
         assert!((one.log_scale[1].exp() - 0.06).abs() < 1e-6 && one.log_scale[0] == 0.01_f32.ln());
-        assert_eq!((moments.updates[0], moments.updates[1]), (3, 0));
+        assert_eq!((ledger.moments.updates[0], ledger.moments.updates[1]), (3, 0));
     }
 
     #[test]
@@ -185,9 +135,9 @@ mod tests {
         broken.colour[1] = f32::NAN;
         let mut map: Gaussians =
             [huge, gaussian([7.0; 3], 0.0), gaussian([0.0; 3], -5.0), broken].into_iter().collect();
-        let mut moments = moments(4);
-        assert_eq!(prune(&mut map, &mut moments), 3);
-        assert_eq!((map.get(0).unwrap().mean, moments.updates.len()), ([7.0; 3], 1));
+        let mut ledger = ledger(4);
+        assert_eq!(prune(&mut map, &mut ledger), 3);
+        assert_eq!((map.get(0).unwrap().mean, ledger.moments.updates.len()), ([7.0; 3], 1));
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub struct FrameState {
     pub path_moments: PathMoments,
     /// Moments of the gain's gradients.
     pub gain_moments: ScalarMoments,
+    /// Steps that the map made on this frame.
+    pub visits: u32,
 }
 
 impl FrameState {
@@ -32,6 +34,7 @@ impl FrameState {
             log_gain: 0.0,
             path_moments: PathMoments::default(),
             gain_moments: ScalarMoments::default(),
+            visits: 0,
         }
     }
 

@@ -46,23 +46,39 @@ pub struct Stage {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Schedule {
     stages: Vec<Stage>,
+    pace: Pace,
 }
 
-/// Until this position steps keep their length, then they shrink to [`FINAL_LENGTH`].
-const HOLD: f64 = 0.25;
-/// Length of the last step, relative to the first.
-const FINAL_LENGTH: f64 = 0.03;
-/// Paths and gains rest until the map has taken shape: one that has not pulls all paths together, and what a chain of
-/// frames has drifted takes long to come back.
-const PATHS_FROM: f64 = 0.3;
-/// The density changes this often while it changes.
-const DENSITY_CHANGES: f64 = 16.0;
+/// How a schedule goes from its beginning to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Pace {
+    /// Until this position steps keep their length, then they shrink.
+    hold: f64,
+    /// Length of the last step, relative to the first.
+    final_length: f64,
+    /// Paths and gains rest until this position: a map that has not taken shape pulls all paths together, and what a
+    /// chain of frames has drifted takes long to come back.
+    paths_from: f64,
+    /// First step length of the paths, full-resolution pixels.
+    path_pixels: f64,
+    /// The density changes this often while it changes.
+    density_changes: f64,
+}
+
+/// From a seeded map to a finished one.
+const WHOLE: Pace =
+    Pace { hold: 0.25, final_length: 0.03, paths_from: 0.3, path_pixels: 0.03, density_changes: 16.0 };
+/// From a map that has grown frame by frame to a finished one, in a fraction of the time: steps may not become short
+/// before the details are there, and paths, tracked against the map already, have little left to go.
+const FINISH: Pace =
+    Pace { hold: 0.2, final_length: 0.2, paths_from: 0.0, path_pixels: 0.015, density_changes: 6.0 };
 /// Position from which the density is final.
 const DENSITY_UNTIL: f64 = 0.6;
+/// Visits from which the path of a keyframe moves while the map grows.
+const SETTLED: u32 = 6;
 
 const LENGTHS: StepLengths =
     StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
-const PATH_PIXELS: f64 = 0.03;
 const LOG_GAIN: f64 = 2e-3;
 const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, alpha: 0.01 };
 
@@ -74,7 +90,31 @@ impl Schedule {
         let coarse = Stage { steps: visits(8, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 9 };
         let fine = Stage { steps: visits(18, 600), time_share: 0.65, level: 0, spacing: 4.0, max_views: 11 };
         let last = Stage { steps: visits(4, 100), time_share: 0.25, level: 0, spacing: 3.0, max_views: 21 };
-        Self { stages: vec![coarse, fine, last] }
+        Self { stages: vec![coarse, fine, last], pace: WHOLE }
+    }
+
+    /// The schedule of `steps` steps that finishes a map which has grown frame by frame.
+    #[must_use]
+    pub fn finish(steps: usize) -> Self {
+        let last = steps / 5;
+        let fine = Stage { steps: steps - last, time_share: 0.8, level: 0, spacing: 6.0, max_views: 11 };
+        let last = Stage { steps: last, time_share: 0.2, level: 0, spacing: 4.0, max_views: 11 };
+        Self { stages: vec![fine, last], pace: FINISH }
+    }
+
+    /// The plan of a step while the map grows, on a keyframe that had so many visits.
+    #[must_use]
+    pub fn growing(visits: u32) -> StepPlan {
+        let paths = if visits < SETTLED { 0.0 } else { 1.0 };
+        StepPlan {
+            level: 1,
+            spacing: 4.0,
+            max_views: 9,
+            lengths: LENGTHS,
+            path_pixels: FINISH.path_pixels * paths,
+            log_gain: LOG_GAIN * paths,
+            weights: WEIGHTS,
+        }
     }
 
     /// Steps of all stages without a time budget.
@@ -105,14 +145,15 @@ impl Schedule {
     #[must_use]
     pub fn plan(&self, position: f64, timed: bool) -> StepPlan {
         let stage = self.stages[self.stage(position, timed)];
-        let shrink = FINAL_LENGTH.powf((position - HOLD).max(0.0) / (1.0 - HOLD));
-        let paths = if position < PATHS_FROM { 0.0 } else { shrink };
+        let Pace { hold, final_length, paths_from, path_pixels, .. } = self.pace;
+        let shrink = final_length.powf((position - hold).max(0.0) / (1.0 - hold));
+        let paths = if position < paths_from { 0.0 } else { shrink };
         StepPlan {
             level: stage.level,
             spacing: stage.spacing,
             max_views: stage.max_views,
             lengths: LENGTHS.scaled(shrink as f32),
-            path_pixels: PATH_PIXELS * paths,
+            path_pixels: path_pixels * paths,
             log_gain: LOG_GAIN * paths,
             weights: WEIGHTS,
         }
@@ -121,7 +162,8 @@ impl Schedule {
     /// Whether the density changes between two positions.
     #[must_use]
     pub fn density_changes(&self, before: f64, after: f64) -> bool {
-        let count = |position: f64| (position.min(DENSITY_UNTIL) * DENSITY_CHANGES / DENSITY_UNTIL).floor();
+        let changes = self.pace.density_changes;
+        let count = |position: f64| (position.min(DENSITY_UNTIL) * changes / DENSITY_UNTIL).floor();
         count(after) > count(before)
     }
 }
@@ -149,6 +191,17 @@ mod tests {
         assert_eq!((start.path_pixels, start.log_gain), (0.0, 0.0));
         assert!(middle.path_pixels > end.path_pixels && end.path_pixels > 0.0);
         assert!((end.lengths.mean / start.lengths.mean - 0.03).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_map_that_has_grown_is_finished_at_full_resolution_with_steps_that_stay_long() {
+        let schedule = Schedule::finish(100);
+        assert_eq!(schedule.steps(), 100);
+        let [start, end] = [0.0, 1.0].map(|position| schedule.plan(position, false));
+        assert!(start.level == 0 && start.path_pixels > 0.0 && end.spacing < start.spacing);
+        assert!((end.lengths.mean / start.lengths.mean - 0.2).abs() < 1e-3);
+        assert_eq!(Schedule::growing(0).path_pixels, 0.0);
+        assert_eq!(Schedule::growing(SETTLED).path_pixels, start.path_pixels);
     }
 
     #[test]

@@ -22,20 +22,35 @@ const SPREAD: f32 = 0.5;
 /// Opacity of a new Gaussian.
 const OPACITY: f32 = 0.9;
 /// A pixel is covered where the map's alpha is larger.
-const COVERED: f32 = 0.5;
+pub(super) const COVERED: f32 = 0.5;
 
 /// Where the depth of new Gaussians comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum DepthSource {
+pub enum DepthSource {
     /// Pixels with a depth only.
     Measured,
     /// Pixels without a depth get one from their surroundings.
     Completed,
 }
 
-/// Depth without noise and, if asked for, without holes, metres.
-fn depth_to_seed(seen: &Observation, source: DepthSource) -> Vec<f32> {
-    let mut depth = smooth_depth(seen);
+/// Largest squares that have a pixel which is not covered, row by row.
+fn open_blocks(seen: &Observation, alpha: &[f32]) -> Vec<bool> {
+    let (width, height) = (seen.camera.width, seen.camera.height);
+    let across = width.div_ceil(LARGEST);
+    let mut open = vec![false; across * height.div_ceil(LARGEST)];
+    for (pixel, _) in alpha.iter().enumerate().filter(|(_, alpha)| **alpha < COVERED) {
+        open[pixel / width / LARGEST * across + pixel % width / LARGEST] = true;
+    }
+    open
+}
+
+/// Depth in metres, without noise where `is_open` and, if asked for, without holes.
+fn depth_to_seed(
+    seen: &Observation,
+    is_open: impl Fn(usize) -> bool + Sync,
+    source: DepthSource,
+) -> Vec<f32> {
+    let mut depth = smooth_depth(seen, is_open);
     if source == DepthSource::Completed {
         let known: Vec<f32> = depth.iter().map(|z| if *z > 0.0 { 1.0 } else { 0.0 }).collect();
         // Inverse depth is what is linear in pixels on a plane.
@@ -62,11 +77,24 @@ pub(super) fn seed(
     room: usize,
 ) -> usize {
     let before = gaussians.len();
-    let depth = depth_to_seed(seen, source);
+    let open = open_blocks(seen, alpha);
+    if room == 0 || !open.contains(&true) {
+        return 0;
+    }
+    let width = seen.camera.width;
+    let is_open = |x: usize, y: usize| open[y / LARGEST * width.div_ceil(LARGEST) + x / LARGEST];
+    let depth = depth_to_seed(seen, |pixel| is_open(pixel % width, pixel / width), source);
     let squares = Squares { seen, depth: &depth, inverse_response, world_from_camera, alpha };
     let region = seen.region;
     for top in (region.top..region.bottom).step_by(LARGEST) {
         for left in (region.left..region.right).step_by(LARGEST) {
+            // With a region that starts within a block, a square reaches into the next.
+            let corners = [0, LARGEST - 1]
+                .map(|by| [(left + by).min(region.right - 1), (top + by).min(region.bottom - 1)]);
+            let [[x0, y0], [x1, y1]] = corners;
+            if ![(x0, y0), (x1, y0), (x0, y1), (x1, y1)].iter().any(|&(x, y)| is_open(x, y)) {
+                continue;
+            }
             squares.divide([left, top], LARGEST, &mut |gaussian| {
                 if gaussians.len() - before < room {
                     gaussians.push(gaussian);

@@ -13,11 +13,14 @@ const RADIUS: usize = 4;
 /// Inverse depths further from that of the middle than this count as another surface, as a fraction of it.
 const SAME_SURFACE: f32 = 0.03;
 
-/// Depth in metres of every pixel that has one, 0 elsewhere: the mean of inverse depth over pairs of pixels on opposite
-/// sides. Inverse depth is linear in pixels on a plane, so a plane of any slant comes back as it is.
-pub(super) fn smooth_depth(seen: &Observation) -> Vec<f32> {
+/// Depth in metres of every pixel that has one, 0 elsewhere: where `is_wanted`, the mean of inverse depth over pairs of
+/// pixels on opposite sides, else as it was measured. Inverse depth is linear in pixels on a plane, so a plane of any
+/// slant comes back as it is.
+pub(super) fn smooth_depth(seen: &Observation, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
     let (width, height) = (seen.camera.width, seen.camera.height);
-    let at = |pixel: usize| smoothed(&seen.depth, width, height, pixel);
+    let at = |pixel: usize| {
+        if is_wanted(pixel) { smoothed(&seen.depth, width, height, pixel) } else { seen.depth[pixel] }
+    };
     (0..width * height).into_par_iter().map(at).collect()
 }
 
@@ -75,7 +78,7 @@ mod tests {
             ..16 => plane(x, y),
             _ => 2.0,
         });
-        for (smooth, given) in smooth_depth(&seen).iter().zip(&seen.depth) {
+        for (smooth, given) in smooth_depth(&seen, |_| true).iter().zip(&seen.depth) {
             assert!((smooth - given).abs() < 1e-5 * given.max(1.0), "{smooth} instead of {given}");
         }
     }
@@ -88,6 +91,7 @@ mod tests {
             let squares = depth.iter().map(|z| (1.0 / z - 0.25).powi(2)).sum::<f32>();
             (squares / depth.len() as f32).sqrt()
         };
-        assert!(deviation(&smooth_depth(&seen)) < 0.3 * deviation(&seen.depth));
+        assert!(deviation(&smooth_depth(&seen, |_| true)) < 0.3 * deviation(&seen.depth));
+        assert_eq!(smooth_depth(&seen, |_| false), seen.depth);
     }
 }

@@ -115,6 +115,13 @@ impl Gaussians {
         self.planes.iter_mut().for_each(|plane| plane.resize(count, 0.0));
     }
 
+    /// The Gaussians with these indices, in their order; indices beyond the set are left out.
+    #[must_use]
+    pub fn select(&self, indices: &[usize]) -> Self {
+        let pick = |plane: &Vec<f32>| indices.iter().filter_map(|&i| plane.get(i).copied()).collect();
+        Self { planes: self.planes.each_ref().map(pick) }
+    }
+
     /// Sets all parameters to zero.
     pub fn fill_zero(&mut self) {
         self.planes.iter_mut().for_each(|plane| plane.fill(0.0));

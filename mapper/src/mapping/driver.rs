@@ -17,7 +17,7 @@ use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter
 const BUDGET_RESERVE: f64 = 0.1;
 
 /// Layout of the checkpoint's content.
-const CHECKPOINT_VERSION: u32 = 1;
+const CHECKPOINT_VERSION: u32 = 2;
 
 /// Memory of the smoothed loss, steps.
 const SMOOTHING: f64 = 50.0;

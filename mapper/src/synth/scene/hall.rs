@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
-use super::{Enclosure, Scene, Sweep, Thing, shadows};
+use super::{Enclosure, Round, Scene, Sweep, Thing, shadows};
 
 pub(super) fn build() -> Scene {
     let mut things = Vec::new();
@@ -27,7 +27,7 @@ pub(super) fn build() -> Scene {
         lamps: Lamps::new(&[lamp(0.0, -2.0), lamp(0.5, 2.5), lamp(-5.0, 3.0), lamp(5.0, 0.0)]),
         shadows: shadows(&things, &[0.9]),
     };
-    Scene::assemble(walls(), things, lighting, sweep())
+    Scene::assemble(walls(), things, lighting, sweep(), round())
 }
 
 fn walls() -> Enclosure {
@@ -88,6 +88,18 @@ fn exhibits() -> Vec<Thing> {
         Material::Carpet { base: colour(0x274a6b), figure: colour(0xd0b070) },
     ));
     things
+}
+
+/// Round between the rows of columns.
+fn round() -> Round {
+    Round {
+        centre: Vector3::new(0.15, 1.6, -0.6),
+        radii: Vector3::new(2.0, 0.1, 0.9),
+        start: 0.0,
+        turn: 1.0,
+        pitch: -0.06,
+        pitch_sway: 0.05,
+    }
 }
 
 /// Along the nave with a look at both sides.

@@ -71,7 +71,7 @@ impl Scene {
     pub(super) fn new(name: SceneName, motion: CameraMotion) -> Self {
         match name {
             SceneName::Room => room::build(motion),
-            SceneName::Hall => hall::build(),
+            SceneName::Hall => hall::build(motion),
             SceneName::Wall => wall::build(),
         }
     }

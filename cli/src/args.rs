@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
-use mba_mapper::synth::{DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
+use mba_mapper::synth::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
@@ -92,6 +92,7 @@ options give equal files.
 Examples:
   mba synth --out data
   mba synth --out hard --scene hall --blur 24 --exposure 0.028 --frames 60 --seed 7
+  mba synth --out round --path loop --frames 240 --size 320x240 --blur 6
   mba synth --out clean --response linear --noise off --depth exact")]
 pub struct Synth {
     /// New or empty folder for the data set
@@ -100,13 +101,16 @@ pub struct Synth {
     /// What the camera sees: room, hall or wall
     #[arg(long, value_name = "NAME", default_value_t = SynthConfig::default().scene)]
     pub scene: SceneName,
+    /// Where the camera goes
+    #[arg(long, value_enum, default_value_t)]
+    pub path: PathName,
     /// Number of frames
     #[arg(long, value_name = "N", default_value_t = SynthConfig::default().frames)]
     pub frames: usize,
     /// Width and height of the images in pixels
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
     pub size: (usize, usize),
-    /// Mean blur length in pixels; 0 holds the camera still
+    /// Mean blur length in pixels, that of the path included; 0 is without hand shake
     #[arg(long, value_name = "PX", default_value_t = 10.0, value_parser = non_negative)]
     pub blur: f64,
     /// Time the shutter is open, in seconds
@@ -136,6 +140,10 @@ impl Synth {
         let defaults = SynthConfig::default();
         SynthConfig {
             scene: self.scene,
+            motion: match self.path {
+                PathName::Shake => CameraMotion::Sweep,
+                PathName::Loop => CameraMotion::Loop,
+            },
             frames: self.frames,
             width: self.size.0,
             height: self.size.1,
@@ -155,6 +163,16 @@ impl Synth {
             ..defaults
         }
     }
+}
+
+/// Values of `--path`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum PathName {
+    /// Slowly to and fro over one side of the scene
+    #[default]
+    Shake,
+    /// Once round the scene, within all frames, and back to where it began
+    Loop,
 }
 
 /// Values of `--response`.

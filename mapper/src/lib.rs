@@ -26,6 +26,7 @@ pub mod infill;
 pub mod losses;
 pub mod mapping;
 mod png;
+pub mod pose_graph;
 pub mod raster;
 pub mod rendering;
 pub mod run;

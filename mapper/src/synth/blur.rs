@@ -96,6 +96,10 @@ pub(super) fn scale_to_blur(
     if requested <= 0.0 {
         return Ok(path.with_strength(0.0));
     }
+    let least = mean_blur(0.0);
+    if requested < least {
+        return Err(SynthError::BlurOfTheWay { requested, least });
+    }
     let reachable = mean_blur(path.strongest());
     if reachable < requested {
         let exposure_seconds = exposures.first().map_or(0.0, |times| times[2] - times[0]);

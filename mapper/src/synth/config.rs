@@ -12,6 +12,8 @@ use super::SynthError;
 pub struct SynthConfig {
     /// The world that is filmed.
     pub scene: SceneName,
+    /// Where the camera goes.
+    pub motion: CameraMotion,
     /// Number of frames, 1 to 100 000.
     pub frames: usize,
     /// Image width in pixels, 16 to 4096.
@@ -23,8 +25,8 @@ pub struct SynthConfig {
     /// Time the shutter is open, seconds; above 0 and at most the frame interval.
     pub exposure_seconds: f64,
     /// Mean over pixels and frames of the distance in pixels between where a surface point is imaged at shutter
-    /// opening and at closing. The hand shake is scaled to meet it; 0 is a camera that stands still. At most an
-    /// eighth of the width.
+    /// opening and at closing. The hand shake is scaled to meet it; 0 is a camera that does not shake, and stands
+    /// still unless it goes a [`CameraMotion::Loop`]. At most an eighth of the width.
     pub mean_blur_px: f64,
     /// Factor on the light before the response, above 0; 1 exposes the scenes well.
     pub gain: f64,
@@ -42,6 +44,7 @@ impl Default for SynthConfig {
     fn default() -> Self {
         Self {
             scene: SceneName::Room,
+            motion: CameraMotion::Sweep,
             frames: 90,
             width: 640,
             height: 480,
@@ -66,6 +69,17 @@ pub enum SceneName {
     Hall,
     /// One flat textured wall 2.5 m away: degenerate for depth alignment.
     Wall,
+}
+
+/// Where the camera goes; the hand shakes in any case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CameraMotion {
+    /// Slowly to and fro over one side of the scene, for as long as there are frames.
+    Sweep,
+    /// Once round the scene, all frames together: the last one looks from the place of the first the same way, and
+    /// half way there is nothing in view that the first one sees. The shake comes on top, so the blur asked for
+    /// cannot be less than that of the way alone.
+    Loop,
 }
 
 /// How the stored 8-bit values follow from light.

@@ -38,6 +38,17 @@ pub enum SynthError {
         /// Largest mean blur at this exposure time, pixels.
         reachable: f64,
     },
+    /// The camera's way blurs more than asked for, without any shake.
+    #[error(
+        "mean blur of {requested} px is less than the {least:.1} px of the camera's way alone; ask for more blur, \
+         more frames or a shorter exposure"
+    )]
+    BlurOfTheWay {
+        /// Mean blur asked for, pixels.
+        requested: f64,
+        /// Mean blur without hand shake, pixels.
+        least: f64,
+    },
     /// The target folder has something in it.
     #[error("{folder} is not empty; name a new folder")]
     FolderNotEmpty {

@@ -1,6 +1,6 @@
 //! Synthetic RGB-D sequences with motion blur and exact ground truth.
 //!
-//! A ray caster films analytic scenes with a camera that sweeps slowly and shakes. Each frame is the mean, in
+//! A ray caster films analytic scenes with a camera that sweeps slowly, or goes round, and shakes. Each frame is the mean, in
 //! linear light, of many views within the exposure, so its blur is that of the true motion, which is smooth but
 //! not linear. Then come gain, noise, response and rounding. On one machine equal settings give equal sequences
 //! bit for bit, for any number of threads.
@@ -28,6 +28,7 @@ mod heldout;
 mod motion;
 mod random;
 mod render;
+mod round;
 mod scene;
 mod sequence;
 #[cfg(test)]
@@ -36,7 +37,7 @@ mod view;
 mod writer;
 
 pub use blur::BlurFigure;
-pub use config::{DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
+pub use config::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
 pub use error::SynthError;
 pub use sequence::{SynthFrame, SynthSequence};
 pub use writer::{Summary, write_dataset};

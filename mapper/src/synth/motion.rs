@@ -1,4 +1,4 @@
-//! The camera's path: a slow sweep with hand shake on top, exact at any time.
+//! The camera's path: a slow sweep or a round with hand shake on top, exact at any time.
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,6 +6,7 @@ use mba_tracker::geometry::{RigidTransform, so3};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::random::{Purpose, RowRandom};
+use super::round::Round;
 
 /// A smooth to and fro over a scene that comes by the same places again. Metres, radians, seconds.
 #[derive(Clone, Copy)]
@@ -30,12 +31,17 @@ impl Sweep {
         let wave = Vector3::new((turn + 0.9).sin(), (1.7 * turn).sin(), (2.0 * turn + 0.4).cos());
         let yaw = self.yaw + self.yaw_sway * turn.sin();
         let pitch = self.pitch + self.pitch_sway * (1.3 * turn + 1.0).sin();
-        let heading = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
-        let elevation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -pitch);
-        // Camera axes are right, down, forward; half a turn about z takes them from x, y (up), z.
-        let upright = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI);
-        RigidTransform::new(heading * elevation * upright, self.centre + self.sway.component_mul(&wave))
+        RigidTransform::new(looking(yaw, pitch), self.centre + self.sway.component_mul(&wave))
     }
+}
+
+/// The rotation of an upright camera; angles as in [`Sweep`].
+pub(super) fn looking(yaw: f64, pitch: f64) -> UnitQuaternion<f64> {
+    let heading = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
+    let elevation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -pitch);
+    // Camera axes are right, down, forward; half a turn about z takes them from x, y (up), z.
+    let upright = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI);
+    heading * elevation * upright
 }
 
 /// Hand tremor and sway: frequencies in Hz, whose ratios are irrational in practice so that the motion never
@@ -84,10 +90,28 @@ impl Tremor {
     }
 }
 
+/// The motion that a hand shakes on top of.
+#[derive(Clone, Copy)]
+pub(super) enum Steady {
+    /// Slower where less blur is asked for.
+    Sweep(Sweep),
+    /// A whole round from time `begin` on within `duration` seconds.
+    Round { round: Round, begin: f64, duration: f64 },
+}
+
+impl Steady {
+    fn pose(&self, time: f64, strength: f64) -> RigidTransform {
+        match self {
+            Self::Sweep(sweep) => sweep.pose(time * strength.min(1.0)),
+            Self::Round { round, begin, duration } => round.pose((time - begin) / duration),
+        }
+    }
+}
+
 /// The camera's continuous path.
 #[derive(Clone)]
 pub(super) struct CameraPath {
-    sweep: Sweep,
+    steady: Steady,
     turns: [Tremor; 3],
     shifts: [Tremor; 3],
     calm_phase: f64,
@@ -96,10 +120,10 @@ pub(super) struct CameraPath {
 
 impl CameraPath {
     /// The path with hand shake of strength 1.
-    pub(super) fn new(sweep: Sweep, seed: u64) -> Self {
+    pub(super) fn new(steady: Steady, seed: u64) -> Self {
         let mut random = RowRandom::new(seed, Purpose::Shake, 0, 0);
         Self {
-            sweep,
+            steady,
             turns: TURN_SPEED.map(|speed| Tremor::new(speed, &mut random)),
             shifts: SHIFT_SPEED.map(|speed| Tremor::new(speed, &mut random)),
             calm_phase: TAU * f64::from(random.uniform()),
@@ -107,8 +131,7 @@ impl CameraPath {
         }
     }
 
-    /// The same path at another strength: 0 stands still, up to 1 everything moves faster, above 1 only the shake
-    /// grows.
+    /// The same path at another strength of the shake. A sweep stands still at 0 and is itself faster up to 1.
     pub(super) fn with_strength(&self, strength: f64) -> Self {
         Self { strength, ..self.clone() }
     }
@@ -121,7 +144,7 @@ impl CameraPath {
 
     /// `world_from_camera` at `time`, seconds.
     pub(super) fn pose(&self, time: f64) -> RigidTransform {
-        let steady = self.sweep.pose(time * self.strength.min(1.0));
+        let steady = self.steady.pose(time, self.strength);
         let shake = self.strength * calm(time, self.calm_phase);
         let turn = Vector3::from_fn(|axis, _| shake * self.turns[axis].at(time));
         let shift = Vector3::from_fn(|axis, _| {

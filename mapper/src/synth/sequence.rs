@@ -6,11 +6,11 @@ use mba_tracker::trajectory::ExposureTrajectory;
 use super::blur::{self, BlurFigure, ExposurePoses};
 use super::develop::Developer;
 use super::heldout;
-use super::motion::CameraPath;
+use super::motion::{CameraPath, Steady};
 use super::render::{self, Size, SubFrame, TURNED_GRID};
 use super::scene::Scene;
 use super::view::View;
-use super::{SynthConfig, SynthError};
+use super::{CameraMotion, SynthConfig, SynthError};
 use crate::trajectory_file::TimedPose;
 
 /// Mid exposure of the first frame, seconds.
@@ -68,9 +68,9 @@ impl SynthSequence {
     /// [`SynthError::Setting`] for a number out of range, [`SynthError::BlurOutOfReach`].
     pub fn new(config: SynthConfig) -> Result<Self, SynthError> {
         config.check()?;
-        let scene = Scene::new(config.scene);
+        let scene = Scene::new(config.scene, config.motion);
         let camera = config.camera();
-        let path = CameraPath::new(scene.sweep, config.seed);
+        let path = CameraPath::new(steady(&config, &scene), config.seed);
         let exposures: Vec<_> = (0..config.frames).map(|index| exposure_times(&config, index)).collect();
         let path = blur::scale_to_blur(&path, &scene, &camera, &exposures, config.mean_blur_px)?;
         Ok(Self { config, camera, scene, path })
@@ -202,6 +202,18 @@ impl SynthSequence {
 
     fn size(&self) -> Size {
         Size { width: self.camera.width, height: self.camera.height }
+    }
+}
+
+/// The way without shake; a round lasts from the first frame to the last.
+fn steady(config: &SynthConfig, scene: &Scene) -> Steady {
+    match config.motion {
+        CameraMotion::Sweep => Steady::Sweep(scene.sweep),
+        CameraMotion::Loop => Steady::Round {
+            round: scene.round,
+            begin: FIRST_TIMESTAMP,
+            duration: (config.frames - 1).max(1) as f64 / config.frame_rate,
+        },
     }
 }
 

@@ -61,9 +61,10 @@ fn track(config: &TrackerConfig, memory: &mut [u8], frames: &[RenderedFrame]) ->
         tracker.track(&view).err()?;
         if k + 3 == frames.len() {
             let world_from_camera = result.world_from_camera.mid();
-            tracker
-                .set_reference(&ReferenceView { colour: view.colour, depth: view.depth, world_from_camera })
-                .ok()?;
+            let reference = ReferenceView { colour: view.colour, depth: view.depth, world_from_camera };
+            tracker.set_reference(&reference).ok()?;
+            tracker.move_world(&RigidTransform::identity()).ok()?;
+            tracker.relocate(&reference).ok()?;
         }
     }
     tracker.reset();

@@ -4,6 +4,7 @@ mod bad_input;
 mod faults;
 mod memory;
 mod noise;
+mod outside;
 mod recovery;
 mod reference_view;
 mod scenes;

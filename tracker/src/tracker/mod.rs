@@ -4,6 +4,7 @@ mod coarse_to_fine;
 mod config;
 mod frame;
 mod history;
+mod outside;
 mod policy;
 mod recovery;
 mod result;

@@ -59,6 +59,13 @@ impl<'m> RecentKeyframes<'m> {
         }
     }
 
+    /// Moves the remembered keyframes to another world.
+    pub(super) fn move_world(&mut self, new_world_from_world: &RigidTransform) {
+        for keyframe in &mut self.slots[..self.filled] {
+            keyframe.world_from_keyframe = new_world_from_world.compose(&keyframe.world_from_keyframe);
+        }
+    }
+
     /// Looks for `view` from the poses of the remembered keyframes and the last known pose; returns
     /// `world_from_camera` at mid exposure.
     #[allow(clippy::too_many_arguments, reason = "borrows disjoint parts of the tracker")]

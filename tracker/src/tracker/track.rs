@@ -6,7 +6,7 @@ use fearless_simd::Level;
 
 use super::coarse_to_fine::{Aligned, FrameTask};
 use super::config::{RECENT_KEYFRAMES, ReferenceMode, SCALE_SAMPLES, TrackerConfig};
-use super::frame::{Frame, ReferenceView};
+use super::frame::Frame;
 use super::history::Motion;
 use super::policy::{Evidence, Typical, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
@@ -37,21 +37,21 @@ const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
 #[derive(Debug)]
 pub struct Tracker<'m> {
     simd: Level,
-    config: TrackerConfig,
-    luminance: LuminanceTable,
+    pub(super) config: TrackerConfig,
+    pub(super) luminance: LuminanceTable,
     pyramid: GreyPyramid<'m>,
     depth: InverseDepthMap<'m>,
     depth_share: f32,
-    keyframe: Keyframe<'m>,
-    recent: RecentKeyframes<'m>,
+    pub(super) keyframe: Keyframe<'m>,
+    pub(super) recent: RecentKeyframes<'m>,
     scratch: AlignScratch<'m>,
     deblur: DeblurScratch<'m>,
     /// Motion in the world; `None` before the first usable frame.
-    motion: Option<Motion>,
-    brightness: BrightnessModel,
+    pub(super) motion: Option<Motion>,
+    pub(super) brightness: BrightnessModel,
     typical: Typical,
-    last_timestamp: f64,
-    frames: usize,
+    pub(super) last_timestamp: f64,
+    pub(super) frames: usize,
 }
 
 impl<'m> Tracker<'m> {
@@ -104,34 +104,6 @@ impl<'m> Tracker<'m> {
         Ok(result)
     }
 
-    /// Replaces the keyframe by a sharp view from outside, for example rendered from a map.
-    ///
-    /// Its pose must be in the tracker's world. Tracking starts from it if no frame was tracked yet.
-    ///
-    /// # Errors
-    /// [`FrameError::Size`] when the images do not have the configured size, [`FrameError::Pose`] when the pose is
-    /// not finite or not a rotation.
-    pub fn set_reference(&mut self, view: &ReferenceView) -> Result<(), FrameError> {
-        self.check_size(&[view.colour.size(), view.depth.size()])?;
-        if !view.world_from_camera.is_valid() {
-            return Err(FrameError::Pose);
-        }
-        self.keep_keyframe();
-        self.keyframe.pyramid.fill(&view.colour, &self.luminance);
-        self.keyframe.depth.fill(&view.depth, self.config.metres_per_unit);
-        self.keyframe.world_from_keyframe = view.world_from_camera;
-        self.keyframe.keyframe_from_camera = Some(ExposureTrajectory::still(RigidTransform::identity()));
-        self.keyframe.blur = 0.0;
-        self.keyframe.frame_index = self.frames.saturating_sub(1);
-        self.keyframe.restart_surface();
-        self.select_keypoints();
-        self.brightness = BrightnessModel::default();
-        if self.motion.is_none() {
-            self.motion = Some(Motion::still(self.last_timestamp, 0.0, view.world_from_camera));
-        }
-        Ok(())
-    }
-
     /// Forgets everything but the configuration.
     pub fn reset(&mut self) {
         self.motion = None;
@@ -153,7 +125,7 @@ impl<'m> Tracker<'m> {
         Ok(())
     }
 
-    fn check_size(&self, sizes: &[(usize, usize)]) -> Result<(), FrameError> {
+    pub(super) fn check_size(&self, sizes: &[(usize, usize)]) -> Result<(), FrameError> {
         let expected = (self.config.camera.width, self.config.camera.height);
         match sizes.iter().find(|&&got| got != expected) {
             Some(&got) => Err(FrameError::Size { expected, got }),
@@ -463,12 +435,12 @@ impl<'m> Tracker<'m> {
         true
     }
 
-    fn select_keypoints(&mut self) {
+    pub(super) fn select_keypoints(&mut self) {
         self.keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
     }
 
     /// Remembers the coarse part of the keyframe for recovery before it is replaced.
-    fn keep_keyframe(&mut self) {
+    pub(super) fn keep_keyframe(&mut self) {
         self.recent.remember(&self.keyframe, self.config.surface_level);
     }
 

@@ -3,12 +3,13 @@
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
 
+use super::super::CameraMotion;
 use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
-use super::{Enclosure, Scene, Sweep, Thing, shadows};
+use super::{Enclosure, Round, Scene, Sweep, Thing, shadows};
 
-pub(super) fn build() -> Scene {
+pub(super) fn build(motion: CameraMotion) -> Scene {
     let mut things = Vec::new();
     for row in [-2.6, 2.6] {
         for place in 0..5_u32 {
@@ -16,6 +17,9 @@ pub(super) fn build() -> Scene {
         }
     }
     things.extend(exhibits());
+    if motion == CameraMotion::Loop {
+        things.extend(exhibits_behind());
+    }
     let lamp = |x: f32, z: f32| Lamp {
         position: Vec3::new(x, 4.2, z),
         colour: Vec3::new(0.75, 0.7, 0.6),
@@ -27,7 +31,7 @@ pub(super) fn build() -> Scene {
         lamps: Lamps::new(&[lamp(0.0, -2.0), lamp(0.5, 2.5), lamp(-5.0, 3.0), lamp(5.0, 0.0)]),
         shadows: shadows(&things, &[0.9]),
     };
-    Scene::assemble(walls(), things, lighting, sweep())
+    Scene::assemble(walls(), things, lighting, sweep(), round())
 }
 
 fn walls() -> Enclosure {
@@ -87,6 +91,37 @@ fn exhibits() -> Vec<Thing> {
         0.0,
         Material::Carpet { base: colour(0x274a6b), figure: colour(0xd0b070) },
     ));
+    things
+}
+
+/// Round between the rows of columns.
+fn round() -> Round {
+    Round {
+        centre: Vector3::new(0.15, 1.6, -0.6),
+        radii: Vector3::new(1.3, 0.1, 0.7),
+        start: 0.0,
+        turn: 1.0,
+        pitch: -0.06,
+        pitch_sway: 0.05,
+    }
+}
+
+/// Pictures and pedestals at the near wall.
+fn exhibits_behind() -> Vec<Thing> {
+    let stone = Material::Bricks { brick: colour(0x8f8b84), mortar: colour(0x4a4844) };
+    let rings = Material::Rings { a: colour(0x2f5d5a), b: colour(0xd9cfa8), width: 0.12 };
+    let globe = Material::Marble { base: colour(0x8a5a6b), vein: colour(0xe6d9b0) };
+    let mut things = Vec::new();
+    for (index, x) in (0_u32..).zip([-6.2, -4.4, -2.5, -0.6, 1.3, 3.2, 5.0, 6.6]) {
+        let size = [1.2 + 0.2 * (index % 3) as f32, 1.7, 0.05];
+        let look = Material::Poster { half: Vec2::new(0.5 * size[0], 0.85), seed: 130 + index };
+        things.push(Thing::cuboid(x, 1.0, -4.975, size, 0.0, look));
+    }
+    for (x, z, degrees) in [(-1.8, -4.1, 12.0), (2.2, -4.2, 50.0), (-5.2, -3.4, 33.0), (6.2, -3.0, 71.0)] {
+        things.push(Thing::cuboid(x, 0.0, z, [0.6, 0.9, 0.6], degrees, stone));
+        things.push(Thing::sphere(x, 1.2, z, 0.3, globe));
+    }
+    things.push(Thing::column(0.2, 0.0, -4.3, 0.16, 2.2, rings));
     things
 }
 

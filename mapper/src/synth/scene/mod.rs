@@ -6,14 +6,16 @@ mod material;
 mod pattern;
 mod print;
 mod room;
+mod room_behind;
 mod room_furniture;
 mod shape;
 mod wall;
 
 use glam::{Vec2, Vec3};
 
-use super::SceneName;
 use super::motion::Sweep;
+use super::round::Round;
+use super::{CameraMotion, SceneName};
 use lighting::{Lighting, SoftShadow, corner_darkening};
 use material::Material;
 pub(super) use shape::Ray;
@@ -26,8 +28,10 @@ pub(super) struct Scene {
     /// Spheres around the things, for culling.
     bounds: Vec<(Vec3, f32)>,
     lighting: Lighting,
-    /// The path of a camera that films this world.
+    /// The path of a camera that films one side of this world.
     pub(super) sweep: Sweep,
+    /// The path of one that films it all round.
+    pub(super) round: Round,
 }
 
 /// The walls: a box seen from inside.
@@ -63,18 +67,24 @@ pub(super) struct Cone {
 }
 
 impl Scene {
-    /// The world of this name.
-    pub(super) fn new(name: SceneName) -> Self {
+    /// The world of this name, furnished where a camera that moves like this looks.
+    pub(super) fn new(name: SceneName, motion: CameraMotion) -> Self {
         match name {
-            SceneName::Room => room::build(),
-            SceneName::Hall => hall::build(),
+            SceneName::Room => room::build(motion),
+            SceneName::Hall => hall::build(motion),
             SceneName::Wall => wall::build(),
         }
     }
 
-    fn assemble(enclosure: Enclosure, things: Vec<Thing>, lighting: Lighting, sweep: Sweep) -> Self {
+    fn assemble(
+        enclosure: Enclosure,
+        things: Vec<Thing>,
+        lighting: Lighting,
+        sweep: Sweep,
+        round: Round,
+    ) -> Self {
         let bounds = things.iter().map(|thing| thing.shape.bounds()).collect();
-        Self { enclosure, things, bounds, lighting, sweep }
+        Self { enclosure, things, bounds, lighting, sweep, round }
     }
 
     /// Replaces `visible` by the things that rays of the cone may meet.

@@ -3,13 +3,15 @@
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
 
+use super::super::CameraMotion;
 use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
+use super::room_behind;
 use super::room_furniture::{armchair, bookshelf, cartons, desk, round_table};
-use super::{Enclosure, Scene, Sweep, Thing, shadows};
+use super::{Enclosure, Round, Scene, Sweep, Thing, shadows};
 
-pub(super) fn build() -> Scene {
+pub(super) fn build(motion: CameraMotion) -> Scene {
     let mut things = pictures();
     things.extend(desk());
     things.extend(bookshelf());
@@ -17,6 +19,9 @@ pub(super) fn build() -> Scene {
     things.extend(cartons());
     things.extend(armchair());
     things.extend(standing());
+    if motion == CameraMotion::Loop {
+        things.extend(room_behind::furniture());
+    }
     let lighting = Lighting {
         from_above: Vec3::new(0.30, 0.31, 0.33),
         from_below: Vec3::new(0.17, 0.15, 0.13),
@@ -27,7 +32,7 @@ pub(super) fn build() -> Scene {
         ]),
         shadows: shadows(&things, &[0.74, 0.72]),
     };
-    Scene::assemble(walls(), things, lighting, sweep())
+    Scene::assemble(walls(), things, lighting, sweep(), round())
 }
 
 fn walls() -> Enclosure {
@@ -106,6 +111,18 @@ fn standing() -> Vec<Thing> {
     ];
     things.extend(leaves.map(|(x, y, z, radius)| Thing::sphere(x, y, z, radius, Material::Foliage)));
     things
+}
+
+/// Round the middle of the near half, looking at each wall in turn.
+fn round() -> Round {
+    Round {
+        centre: Vector3::new(0.1, 1.42, -0.9),
+        radii: Vector3::new(1.0, 0.08, 0.6),
+        start: 0.0,
+        turn: 1.0,
+        pitch: -0.17,
+        pitch_sway: 0.05,
+    }
 }
 
 /// To and fro over the far half of the room from its near half.

@@ -1,12 +1,14 @@
 //! One flat wall, so wide that the camera sees nothing else.
 
+use std::f64::consts::FRAC_PI_2;
+
 use glam::Vec3;
 use nalgebra::Vector3;
 
 use super::lighting::{Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
-use super::{Enclosure, Scene, Sweep};
+use super::{Enclosure, Round, Scene, Sweep};
 
 pub(super) fn build() -> Scene {
     let bricks = Material::Bricks { brick: colour(0xb5634a), mortar: colour(0xc9c1b2) };
@@ -21,7 +23,19 @@ pub(super) fn build() -> Scene {
         lamps: Lamps::new(&[]),
         shadows: Vec::new(),
     };
-    Scene::assemble(enclosure, Vec::new(), lighting, sweep())
+    Scene::assemble(enclosure, Vec::new(), lighting, sweep(), round())
+}
+
+/// Along the wall and back, never turning away from it.
+fn round() -> Round {
+    Round {
+        centre: Vector3::zeros(),
+        radii: Vector3::new(2.6, 0.2, 0.3),
+        start: -FRAC_PI_2,
+        turn: 0.0,
+        pitch: 0.0,
+        pitch_sway: 0.1,
+    }
 }
 
 fn sweep() -> Sweep {

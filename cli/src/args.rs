@@ -1,6 +1,7 @@
 //! The command line.
 
 pub mod map;
+pub mod slam;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -55,6 +56,8 @@ pub enum Command {
     Track(Track),
     /// Make a sharp map of a tracked data set, refine all poses and deblur keyframes
     Map(map::Map),
+    /// Track and map a data set at the same time
+    Slam(slam::Slam),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
     /// Write report.html and charts into a RUN folder

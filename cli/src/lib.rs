@@ -54,6 +54,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Info(args) => commands::info::run(args, console),
         Command::Track(args) => commands::track::run(args, console),
         Command::Map(args) => commands::map::run(args, console),
+        Command::Slam(args) => commands::slam::run(args, console),
         Command::Render(args) => commands::render::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),

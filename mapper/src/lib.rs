@@ -30,6 +30,7 @@ pub mod pose_graph;
 pub mod raster;
 pub mod rendering;
 pub mod run;
+pub mod slam;
 pub mod synth;
 mod text_lines;
 pub mod tracking;

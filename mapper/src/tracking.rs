@@ -117,17 +117,19 @@ fn track_frame(
     index: usize,
 ) -> Result<(FrameResult, f64), SkipReason> {
     let image = dataset.frame(index)?;
-    let frame = view(&image)?;
+    let frame = tracker_view(&image)?;
     let begin = Instant::now();
     let result = tracker.track(&frame)?;
     Ok((result, begin.elapsed().as_secs_f64() * 1e3))
 }
 
-fn timed(timestamp: f64, path: &ExposureTrajectory) -> TimedExposure {
+/// An exposure with linear motion.
+pub(crate) fn timed(timestamp: f64, path: &ExposureTrajectory) -> TimedExposure {
     TimedExposure { timestamp, start: path.start, mid: path.mid(), end: path.end }
 }
 
-fn view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
+/// A frame as the tracker takes it.
+pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
     let (width, height) = (image.width, image.height);
     Ok(Frame {
         timestamp: image.timestamp,
@@ -138,7 +140,8 @@ fn view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
     })
 }
 
-fn record(result: &FrameResult, ms: f64) -> FrameRecord {
+/// What is recorded of a frame that took `ms` milliseconds.
+pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     FrameRecord {
         timestamp: result.timestamp,
@@ -159,7 +162,7 @@ fn record(result: &FrameResult, ms: f64) -> FrameRecord {
 }
 
 /// The stand-in for a frame without a result: a camera that stays where it was.
-fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
+pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
     let pose = last.map_or_else(RigidTransform::identity, |exposure| exposure.mid);
     let exposure = TimedExposure { timestamp, start: pose, mid: pose, end: pose };
     let record = FrameRecord {

@@ -41,6 +41,15 @@ pub struct TimedExposure {
     pub end: RigidTransform,
 }
 
+impl TimedExposure {
+    /// The same exposure in another world.
+    #[must_use]
+    pub fn seen_from(&self, other_from_world: &RigidTransform) -> Self {
+        let [start, mid, end] = [self.start, self.mid, self.end].map(|pose| other_from_world.compose(&pose));
+        Self { timestamp: self.timestamp, start, mid, end }
+    }
+}
+
 /// Reads a TUM trajectory: lines `timestamp tx ty tz qx qy qz qw` with increasing timestamps.
 ///
 /// # Errors

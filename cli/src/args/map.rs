@@ -115,7 +115,7 @@ fn seconds(text: &str) -> Result<Duration, String> {
 }
 
 /// A positive, finite number of seconds.
-fn positive_seconds(text: &str) -> Result<Duration, String> {
+pub(super) fn positive_seconds(text: &str) -> Result<Duration, String> {
     let duration = seconds(text)?;
     if duration.is_zero() { Err("expected more than 0 seconds".to_owned()) } else { Ok(duration) }
 }

@@ -8,5 +8,6 @@ pub mod map;
 pub mod open;
 pub mod render;
 pub mod report;
+pub mod slam;
 pub mod synth;
 pub mod track;

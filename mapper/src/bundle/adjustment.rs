@@ -1,5 +1,6 @@
 //! Joint optimisation of the map and of the paths of all exposures.
 
+use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
@@ -68,6 +69,8 @@ pub struct BundleState {
     pub frames: Vec<FrameState>,
     /// Steps made.
     pub steps: usize,
+    /// Those of the schedule.
+    pub scheduled_steps: usize,
     /// Where the schedule stands, 0 to 1.
     pub position: f64,
 }
@@ -125,6 +128,7 @@ impl BundleAdjustment {
             ledger: Ledger::default(),
             frames,
             steps: 0,
+            scheduled_steps: 0,
             position: 0.0,
         };
         let seeding = Default::default();
@@ -156,10 +160,17 @@ impl BundleAdjustment {
         both.then(|| (self.keyframes.remove(k), self.state.frames.remove(k)))
     }
 
+    /// What is known of the path of keyframe `k` besides its picture.
+    pub fn set_prior(&mut self, k: usize, prior: PathPrior) {
+        if let Some(keyframe) = self.keyframes.get_mut(k) {
+            keyframe.prior = prior;
+        }
+    }
+
     /// Starts another schedule at its beginning.
     pub fn start(&mut self, schedule: Schedule) {
         self.schedule = schedule;
-        self.state.position = 0.0;
+        (self.state.scheduled_steps, self.state.position) = (0, 0.0);
     }
 
     /// Allows up to so many Gaussians from now on.
@@ -183,18 +194,33 @@ impl BundleAdjustment {
     /// Adds what keyframe `k` sees and the map does not cover. Returns the share (0 to 1) of the picture that was not
     /// covered.
     pub fn seed_from(&mut self, k: usize, source: DepthSource) -> f64 {
-        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
-        let seen = keyframe.observation.level(0);
-        let world_from_camera = frame.path.mid();
-        let view = RasterView { camera: seen.camera, world_from_camera, background: [0.0; 3] };
-        let (scratch, image) = (&mut self.seeding.0, &mut self.seeding.1);
-        Rasterizer::new(self.level).forward(&self.state.gaussians, &view, scratch, image);
+        let world_from_camera = self.state.frames[k].path.mid();
+        let open = self.open_share(&world_from_camera, 0);
+        let keyframe = &self.keyframes[k];
+        let (seen, alpha) = (keyframe.observation.level(0), &self.seeding.1.alpha);
         let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
         let (map, response) = (&mut self.state.gaussians, &self.sensor.inverse_response);
-        seeding::seed(map, seen, response, &world_from_camera, &image.alpha, source, room);
+        seeding::seed(map, seen, response, &world_from_camera, alpha, source, room);
         self.state.ledger.enrol(self.state.gaussians.len(), keyframe.index);
+        open
+    }
+
+    /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
+    pub fn open_share(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
+        let camera = self.sensor.camera.at_level(level);
+        let view = RasterView { camera, world_from_camera: *world_from_camera, background: [0.0; 3] };
+        let (scratch, image) = (&mut self.seeding.0, &mut self.seeding.1);
+        Rasterizer::new(self.level).forward(&self.state.gaussians, &view, scratch, image);
         let open = image.alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
         open as f64 / image.alpha.len().max(1) as f64
+    }
+
+    /// Number of virtual views that a step with `plan` on keyframe `k` renders.
+    #[must_use]
+    pub fn views(&self, k: usize, plan: &StepPlan) -> usize {
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let camera = &keyframe.observation.level(plan.level).camera;
+        self.settings.views(frame.blur_px(camera, keyframe.depth), plan)
     }
 
     /// One step on the next keyframe, after which the schedule stands at `position_after`. `timed` says whether
@@ -205,6 +231,7 @@ impl BundleAdjustment {
         let k = self.next_keyframe()?;
         let plan = self.schedule.plan(self.state.position, timed);
         let report = self.visit(k, &plan);
+        self.state.scheduled_steps += 1;
         let before = core::mem::replace(&mut self.state.position, position_after(&self.schedule));
         if self.schedule.density_changes(before, self.state.position) {
             self.change_density();
@@ -216,7 +243,7 @@ impl BundleAdjustment {
     pub fn visit(&mut self, k: usize, plan: &StepPlan) -> StepReport {
         let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
         let seen = keyframe.observation.level(plan.level);
-        let views = self.settings.views(frame.blur_px(&seen.camera, keyframe.depth), plan);
+        let views = self.views(k, plan);
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
         let loss = self.engine.evaluate(&self.state.gaussians, exposure, plan);
 

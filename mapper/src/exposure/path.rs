@@ -29,6 +29,12 @@ impl ExposurePath {
         Self { ends, bow: Vector6::zeros() }
     }
 
+    /// The path of a camera that stays where it is.
+    #[must_use]
+    pub fn still(world_from_camera: RigidTransform) -> Self {
+        Self::linear(ExposureTrajectory::still(world_from_camera))
+    }
+
     /// The path through the three poses of an exposure.
     #[must_use]
     pub fn through(exposure: &TimedExposure) -> Self {

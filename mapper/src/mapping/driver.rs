@@ -1,7 +1,7 @@
 //! The run from start to end.
 
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ use crate::dataset::Dataset;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
 
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.
-const BUDGET_RESERVE: f64 = 0.1;
+pub(super) const BUDGET_RESERVE: f64 = 0.1;
 
 /// Layout of the checkpoint's content.
 const CHECKPOINT_VERSION: u32 = 2;
@@ -46,8 +46,8 @@ struct Saved {
 
 /// What the driver keeps of the steps: seconds for the map so far, and smoothed figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Running {
-    seconds: f64,
+pub(super) struct Running {
+    pub(super) seconds: f64,
     loss: f64,
     mean_square: f64,
 }
@@ -93,7 +93,10 @@ pub fn map_dataset(
     let mut writer = RunWriter::create(out, describe)?;
     output::push_tracked(&mut writer, &frames)?;
     let earlier = running.seconds;
-    let adjustment = Adjustment { settings, checkpoint: &checkpoint, identity: &identity, started, earlier };
+    let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
+    let checkpoint =
+        Checkpoint { path: &checkpoint, identity: &identity, interval: settings.checkpoint_interval };
+    let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
     running.seconds = adjustment.seconds();
     let summary = conclude(dataset, bundle, frames, settings, writer, running)?;
@@ -102,7 +105,7 @@ pub fn map_dataset(
 }
 
 /// Fits the frames between keyframes to the finished map, repairs what is left, and writes everything.
-fn conclude(
+pub(super) fn conclude(
     dataset: &Dataset,
     mut bundle: BundleAdjustment,
     mut frames: Frames,
@@ -137,32 +140,38 @@ fn conclude(
 }
 
 /// The loop of steps and what belongs to it.
-struct Adjustment<'a> {
-    settings: &'a MapSettings,
-    checkpoint: &'a Path,
-    identity: &'a Identity,
-    started: Instant,
+pub(super) struct Adjustment<'a> {
+    /// Seconds for it; `None` for the steps of the schedule.
+    pub(super) budget: Option<f64>,
+    pub(super) checkpoint: Option<Checkpoint<'a>>,
+    pub(super) started: Instant,
     /// Seconds that earlier parts of the run took.
-    earlier: f64,
+    pub(super) earlier: f64,
+}
+
+/// Where the state is kept while the loop runs.
+pub(super) struct Checkpoint<'a> {
+    path: &'a Path,
+    identity: &'a Identity,
+    interval: Duration,
 }
 
 impl Adjustment<'_> {
-    fn run(
+    pub(super) fn run(
         &self,
         bundle: &mut BundleAdjustment,
         running: &mut Running,
         observe: &mut impl FnMut(MapProgress),
     ) -> Result<(), MapError> {
-        let budget = self.settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
         let mut last_saved = Instant::now();
         while bundle.state.position < 1.0 {
-            let steps = bundle.state.steps;
-            let report = bundle.step(budget.is_some(), |schedule| match budget {
-                None => (steps + 1) as f64 / schedule.steps().max(1) as f64,
+            let steps = bundle.state.scheduled_steps + 1;
+            let report = bundle.step(self.budget.is_some(), |schedule| match self.budget {
+                None => steps as f64 / schedule.steps().max(1) as f64,
                 Some(budget) => self.seconds() / budget,
             });
             let Some(report) = report else { break };
-            running.add(report.terms.total(), report.terms.mean_square, bundle.state.steps);
+            running.add(report.terms.total(), report.terms.mean_square, steps);
             observe(MapProgress {
                 position: bundle.state.position.min(1.0),
                 steps: bundle.state.steps,
@@ -170,8 +179,10 @@ impl Adjustment<'_> {
                 loss: running.loss,
                 psnr: -10.0 * running.mean_square.log10(),
             });
-            if last_saved.elapsed() >= self.settings.checkpoint_interval {
-                self.save(bundle, running)?;
+            if let Some(checkpoint) = &self.checkpoint
+                && last_saved.elapsed() >= checkpoint.interval
+            {
+                self.save(checkpoint, bundle, running)?;
                 last_saved = Instant::now();
             }
         }
@@ -179,18 +190,23 @@ impl Adjustment<'_> {
     }
 
     /// Time for the map so far, earlier parts of the run included.
-    fn seconds(&self) -> f64 {
+    pub(super) fn seconds(&self) -> f64 {
         self.earlier + self.started.elapsed().as_secs_f64()
     }
 
-    fn save(&self, bundle: &BundleAdjustment, running: &Running) -> Result<(), MapError> {
+    fn save(
+        &self,
+        checkpoint: &Checkpoint<'_>,
+        bundle: &BundleAdjustment,
+        running: &Running,
+    ) -> Result<(), MapError> {
         #[derive(Serialize)]
         struct Saving<'a> {
             state: &'a BundleState,
             running: Running,
         }
         let running = Running { seconds: self.seconds(), ..*running };
-        save(self.checkpoint, self.identity, &Saving { state: &bundle.state, running })?;
+        save(checkpoint.path, checkpoint.identity, &Saving { state: &bundle.state, running })?;
         Ok(())
     }
 }

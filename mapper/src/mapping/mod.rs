@@ -9,6 +9,7 @@ mod between;
 mod choice;
 mod driver;
 mod error;
+mod finish;
 mod merit;
 mod output;
 mod prepare;
@@ -16,4 +17,7 @@ mod settings;
 
 pub use driver::{MapProgress, map_dataset};
 pub use error::MapError;
+pub(crate) use finish::Finish;
+pub(crate) use prepare::sensor;
 pub use settings::MapSettings;
+pub(crate) use settings::PIXELS_PER_GAUSSIAN;

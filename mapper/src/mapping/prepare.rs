@@ -1,7 +1,6 @@
 //! From a run to a bundle that can be adjusted.
 
 use mba_tracker::SimdLevel;
-use mba_tracker::trajectory::ExposureTrajectory;
 use rayon::prelude::*;
 
 use super::choice::choose_keyframes;
@@ -35,7 +34,7 @@ pub(super) struct Frames {
 }
 
 /// How frames of the data set become observations.
-pub(super) fn sensor(dataset: &Dataset) -> Sensor {
+pub(crate) fn sensor(dataset: &Dataset) -> Sensor {
     let calibration = dataset.calibration();
     Sensor {
         camera: calibration.camera,
@@ -49,15 +48,24 @@ impl Frames {
     /// Repairs the exposures of a run.
     pub(super) fn new(dataset: &Dataset, run: &Run) -> Result<Self, MapError> {
         check_frames(dataset, run)?;
+        Self::of(dataset, &run.exposures, &run.frames)
+    }
+
+    /// Repairs the exposures of all frames of the data set.
+    pub(super) fn of(
+        dataset: &Dataset,
+        exposures: &[TimedExposure],
+        records: &[FrameRecord],
+    ) -> Result<Self, MapError> {
         let seconds = exposure_seconds(dataset);
         let settings = ContinuitySettings::default();
-        let repaired = repair_run(&run.exposures, &run.frames, &seconds, &settings)?;
-        let frames = run_frames(&repaired.exposures, &run.frames, &seconds)?;
+        let repaired = repair_run(exposures, records, &seconds, &settings)?;
+        let frames = run_frames(&repaired.exposures, records, &seconds)?;
         let motions = predict_motions(&frames, &settings).into_iter();
         let prior = |(motion, exposure)| PathPrior { middle: motion_of(exposure).mid(), motion };
         let priors = motions.zip(&repaired.exposures).map(prior).collect();
         let warnings = repairs(&repaired, "before");
-        Ok(Self { exposures: repaired.exposures, records: run.frames.clone(), priors, warnings })
+        Ok(Self { exposures: repaired.exposures, records: records.to_vec(), priors, warnings })
     }
 
     /// Repairs exposures that were refined, and tells what was done.
@@ -75,11 +83,7 @@ impl Frames {
     /// First estimate of a frame's path.
     pub(super) fn state(&self, index: usize, settings: &MapSettings) -> FrameState {
         let path = ExposurePath::through(&self.exposures[index]);
-        FrameState::new(if settings.blur {
-            path
-        } else {
-            ExposurePath::linear(ExposureTrajectory::still(path.mid()))
-        })
+        FrameState::new(if settings.blur { path } else { ExposurePath::still(path.mid()) })
     }
 }
 

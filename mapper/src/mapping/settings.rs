@@ -40,7 +40,7 @@ impl Default for MapSettings {
 }
 
 /// Image pixels per Gaussian: what a camera sees is described by a third as many Gaussians as it has pixels.
-const PIXELS_PER_GAUSSIAN: usize = 3;
+pub(crate) const PIXELS_PER_GAUSSIAN: usize = 3;
 
 /// The settings that change the result, for the identity of a checkpoint.
 #[derive(Serialize)]
@@ -52,7 +52,7 @@ pub(super) struct Decisive {
 
 impl MapSettings {
     /// Those of the bundle adjustment, for images of that many pixels.
-    pub(super) fn bundle(&self, pixels: usize) -> BundleSettings {
+    pub(crate) fn bundle(&self, pixels: usize) -> BundleSettings {
         let by_size = (pixels / PIXELS_PER_GAUSSIAN).max(2000);
         BundleSettings {
             blur: self.blur,

@@ -106,6 +106,12 @@ impl RunWriter {
         &self.exposures
     }
 
+    /// What was recorded of the frames so far.
+    #[must_use]
+    pub fn frames(&self) -> &[FrameRecord] {
+        &self.frames
+    }
+
     /// Index and exposure of every keyframe so far.
     #[must_use]
     pub fn keyframes(&self) -> Vec<(usize, TimedExposure)> {

@@ -64,7 +64,7 @@ fn track(config: &TrackerConfig, memory: &mut [u8], frames: &[RenderedFrame]) ->
             let reference = ReferenceView { colour: view.colour, depth: view.depth, world_from_camera };
             tracker.set_reference(&reference).ok()?;
             tracker.move_world(&RigidTransform::identity()).ok()?;
-            tracker.relocate(&reference).ok()?;
+            tracker.relocate(&reference, &reference.world_from_camera).ok()?;
         }
     }
     tracker.reset();

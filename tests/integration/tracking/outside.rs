@@ -86,7 +86,7 @@ fn a_lost_tracker_goes_on_where_it_is_told_to_be() {
     let view = rendered.view();
     let world_from_camera = origin.inverse().compose(&rendered.truth.mid());
     let reference = ReferenceView { colour: view.colour, depth: view.depth, world_from_camera };
-    tracker.relocate(&reference).expect("a valid view");
+    tracker.relocate(&reference, &reference.world_from_camera).expect("a valid view");
     for frame in &SMALL[5..12] {
         let result = tracker.track(&frame.view()).expect("a valid frame");
         let (metres, radians) = pose_error(&result, frame, &SMALL[0]);

@@ -37,16 +37,23 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    /// Replaces the keyframe as [`Self::set_reference`] does and goes on near the pose of the view, wherever the
-    /// camera was thought to be before: for a lost tracker whose place was recognised. The next frame is looked for
-    /// around the view; how the camera moves is unknown until then.
+    /// Replaces the keyframe as [`Self::set_reference`] does and goes on near `world_from_camera`, wherever the camera
+    /// was thought to be before: for a lost tracker whose place was recognised. The next frame is looked for around
+    /// that pose and that of the view; how the camera moves is unknown until then.
     ///
     /// # Errors
-    /// As [`Self::set_reference`]; the tracker is then unchanged.
-    pub fn relocate(&mut self, view: &ReferenceView) -> Result<(), FrameError> {
+    /// As [`Self::set_reference`], also for `world_from_camera`; the tracker is then unchanged.
+    pub fn relocate(
+        &mut self,
+        view: &ReferenceView,
+        world_from_camera: &RigidTransform,
+    ) -> Result<(), FrameError> {
+        if !world_from_camera.is_valid() {
+            return Err(FrameError::Pose);
+        }
         self.set_reference(view)?;
-        // As long ago as can be: the way from the view to the next frame then says nothing about its speed.
-        self.motion = Some(Motion::still(f64::NEG_INFINITY, 0.0, view.world_from_camera));
+        // As long ago as can be: the way from there to the next frame then says nothing about its speed.
+        self.motion = Some(Motion::still(f64::NEG_INFINITY, 0.0, *world_from_camera));
         Ok(())
     }
 

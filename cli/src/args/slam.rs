@@ -1,0 +1,150 @@
+//! Arguments of `mba slam` and `mba ablate`.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use mba_mapper::slam::{Arrival, SlamReference, SlamSettings};
+
+use super::map::{Field, positive_seconds};
+use super::{BlurMode, Switch, virtual_views};
+
+/// Arguments of `mba slam`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Tracker and mapper work at the same time: each frame is aligned with a sharp view rendered from the map, and the \
+map is refined with every frame. After the last frame all of it is refined once more. RUN gets what `mba map` \
+writes; its trajectory is kept up to date while frames come in, so that a stopped run can be evaluated.
+
+Examples:
+  mba slam rgbd_dataset_freiburg1_rpy --out run
+  mba slam data --out live --realtime --time-budget 10")]
+pub struct Slam {
+    /// Folder of the data set
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// RUN folder to write; an earlier run in it is replaced
+    #[arg(long, value_name = "RUN")]
+    pub out: PathBuf,
+    /// How it is done.
+    #[command(flatten)]
+    pub slamming: Slamming,
+}
+
+/// Arguments of `mba ablate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Runs `mba slam` with defaults, then once more with each part left out or replaced, and prints a table. DIR gets \
+one RUN folder per row; rows whose folder is complete are not run again.
+
+Example:
+  mba ablate data --out ablation")]
+pub struct Ablate {
+    /// Folder of the data set, with ground truth
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// Folder for the runs
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+/// How SLAM is done.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Slamming {
+    /// What the map consists of
+    #[arg(long, value_enum, default_value_t)]
+    pub field: Field,
+    /// Frames arrive by their timestamps; those that come too late for the tracker are skipped. Default: tracker and
+    /// mapper in lock step, as fast as they can, with the same result every time
+    #[arg(long)]
+    pub realtime: bool,
+    /// Seconds for the refinement after the last frame; default: as long as the number of keyframes asks for
+    #[arg(long, value_name = "S", value_parser = positive_seconds)]
+    pub time_budget: Option<Duration>,
+    /// At most this many keyframes at a time
+    #[arg(long, value_name = "N", default_value_t = default_keyframes())]
+    pub max_keyframes: NonZeroUsize,
+    /// At most this many Gaussians; default: a third of the pixels that showed something new
+    #[arg(long, value_name = "N")]
+    pub max_gaussians: Option<NonZeroUsize>,
+    /// Seed of the choice of keyframes to visit
+    #[arg(long, value_name = "N", default_value_t = SlamSettings::default().seed)]
+    pub seed: u64,
+    /// What can be left out.
+    #[command(flatten)]
+    pub ablation: Ablation,
+}
+
+/// What can be left out or replaced, to see what it is worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Args)]
+#[command(next_help_heading = "Ablation: leave a part out to see what it is worth")]
+pub struct Ablation {
+    /// Model the motion during the exposure, or take every frame for sharp
+    #[arg(long, value_enum, default_value_t)]
+    pub blur: BlurMode,
+    /// Virtual views per exposure, at the most; default: as many as the blur length asks for
+    #[arg(long, value_name = "N", value_parser = virtual_views)]
+    pub virtual_views: Option<usize>,
+    /// What frames are aligned with: keyframes as captured or deblurred, or views of the map
+    #[arg(long, value_enum, default_value_t)]
+    pub reference: MapReference,
+    /// Use the depth map of each frame, or only that of the reference
+    #[arg(long, value_enum, default_value_t)]
+    pub depth_term: Switch,
+    /// Correct the drift when a place is seen again
+    #[arg(long = "loop", value_enum, default_value_t)]
+    pub loops: Switch,
+}
+
+/// Values of `--reference`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum MapReference {
+    /// Keyframes as captured
+    Raw,
+    /// Keyframes deblurred with their own motion
+    Deblurred,
+    /// Views of the map; deblurred keyframes while it is young
+    #[default]
+    Map,
+}
+
+impl From<&Slamming> for SlamSettings {
+    fn from(args: &Slamming) -> Self {
+        let Ablation { blur, virtual_views, reference, depth_term, loops } = args.ablation;
+        Self {
+            blur: blur == BlurMode::Auto,
+            virtual_views,
+            reference: match reference {
+                MapReference::Raw => SlamReference::Raw,
+                MapReference::Deblurred => SlamReference::Deblurred,
+                MapReference::Map => SlamReference::Map,
+            },
+            depth_term: depth_term == Switch::On,
+            loops: loops == Switch::On,
+            max_keyframes: args.max_keyframes.get(),
+            max_gaussians: args.max_gaussians.map(NonZeroUsize::get),
+            time_budget: args.time_budget,
+            arrival: if args.realtime { Arrival::RealTime } else { Arrival::LockStep },
+            seed: args.seed,
+        }
+    }
+}
+
+impl Default for Slamming {
+    fn default() -> Self {
+        Self {
+            field: Field::default(),
+            realtime: false,
+            time_budget: None,
+            max_keyframes: default_keyframes(),
+            max_gaussians: None,
+            seed: SlamSettings::default().seed,
+            ablation: Ablation::default(),
+        }
+    }
+}
+
+fn default_keyframes() -> NonZeroUsize {
+    NonZeroUsize::new(SlamSettings::default().max_keyframes).unwrap_or(NonZeroUsize::MIN)
+}

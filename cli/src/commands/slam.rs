@@ -1,0 +1,117 @@
+//! `mba slam`.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use mba_mapper::dataset::Dataset;
+use mba_mapper::run::{RunCamera, RunError, RunSettings, Summary};
+use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
+use mba_mapper::tracking::TrackingError;
+use serde_json::json;
+
+use super::open;
+use crate::args::slam::{Slam, Slamming};
+use crate::console::Console;
+use crate::failure::{OrBadInput, is_disk_full};
+use crate::report::table;
+
+/// Steps of the refinement's progress bar: positions are shares, not counts.
+const REFINEMENT_STEPS: u64 = 1000;
+
+/// Tracks and maps a data set and prints the summary.
+///
+/// # Errors
+/// Bad input when the data set cannot be used; failure when the results cannot be written.
+pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
+    let dataset = open::dataset(&args.dataset)?;
+    let summary = slam_into(&dataset, &args.out, &args.slamming, console)?;
+    console.result(&summary, table::summary)
+}
+
+/// Tracks and maps `dataset` into the RUN folder `out`.
+///
+/// # Errors
+/// As [`run`].
+pub fn slam_into(
+    dataset: &Dataset,
+    out: &Path,
+    args: &Slamming,
+    console: &Console,
+) -> anyhow::Result<Summary> {
+    let progress = console.progress(dataset.len(), "frames");
+    let observe = |at: SlamProgress| match at {
+        SlamProgress::Frames { frames, keyframes, gaussians } => {
+            progress.set_position(frames as u64);
+            progress.set_message(format!("frames: {keyframes} keyframes, {gaussians} Gaussians"));
+        }
+        SlamProgress::Refinement { position, psnr } => {
+            progress.set_length(REFINEMENT_STEPS);
+            progress.set_position((position * REFINEMENT_STEPS as f64) as u64);
+            progress.set_message(format!("refining: {psnr:.1} dB"));
+        }
+    };
+    let finished = run_slam(dataset, &SlamSettings::from(args), out, describe(dataset, args), observe);
+    progress.finish_and_clear();
+    let summary = finished.or_else(advise)?;
+    for warning in &summary.warnings {
+        console.warning(warning);
+    }
+    console.note(format!("wrote {}", out.display()));
+    Ok(summary)
+}
+
+fn describe(dataset: &Dataset, args: &Slamming) -> RunSettings {
+    // The run may be looked at from another directory.
+    let folder = dataset.folder().canonicalize().unwrap_or_else(|_| dataset.folder().to_owned());
+    let auto = |limit: Option<usize>| limit.map_or_else(|| json!("auto"), |limit| json!(limit));
+    let on_off = |on: bool| if on { "on" } else { "off" };
+    let settings = SlamSettings::from(args);
+    let values = json!({
+        "field": name(&args.field),
+        "realtime": args.realtime,
+        "blur": name(&args.ablation.blur),
+        "virtual_views": auto(settings.virtual_views),
+        "reference": name(&args.ablation.reference),
+        "depth_term": on_off(settings.depth_term),
+        "loop": on_off(settings.loops),
+        "max_keyframes": settings.max_keyframes,
+        "max_gaussians": auto(settings.max_gaussians),
+        "time_budget_seconds": settings.time_budget.map(|budget| budget.as_secs_f64()),
+        "seed": settings.seed,
+    });
+    RunSettings {
+        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
+        dataset: folder.display().to_string(),
+        frame_rate: dataset.calibration().frame_rate,
+        camera: Some(RunCamera::from(dataset.calibration())),
+        options: values.as_object().cloned().unwrap_or_default(),
+    }
+}
+
+/// The name of a value on the command line.
+fn name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+/// Advice for what the user can repair.
+fn advise(error: SlamError) -> anyhow::Result<Summary> {
+    let disk_is_full = match &error {
+        SlamError::Run(error) => is_disk_full(error),
+        SlamError::Map(mba_mapper::mapping::MapError::Run(error)) => is_disk_full(error),
+        _ => false,
+    };
+    if disk_is_full {
+        return Err(error.into());
+    }
+    let hint = match &error {
+        SlamError::Tracking(TrackingError::Camera(_)) => {
+            "check the calibration: the tracker needs at least 32 x 32 pixels"
+        }
+        SlamError::Run(RunError::Unwritable { .. }) => {
+            "name a folder for --out that can be created or written"
+        }
+        SlamError::Map(_) => "a map needs frames with depth that can be tracked; see `mba info DATASET`",
+        _ => "see `mba info DATASET`",
+    };
+    Err(error).or_bad_input(hint)
+}

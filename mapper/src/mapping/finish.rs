@@ -1,0 +1,74 @@
+//! From a map that has grown frame by frame to a finished RUN folder.
+
+use std::time::Instant;
+
+use super::driver::{Adjustment, BUDGET_RESERVE, Running, conclude};
+use super::prepare::Frames;
+use super::{MapError, MapProgress, MapSettings};
+use crate::bundle::{BundleAdjustment, DepthSource, Schedule};
+use crate::dataset::Dataset;
+use crate::run::{FrameRecord, RunWriter, Summary};
+use crate::trajectory_file::TimedExposure;
+
+/// Work per keyframe, in virtual views of full resolution.
+const EFFORT: f64 = 16.0;
+
+/// What a step costs besides its views, in views.
+const STEP_COST: f64 = 2.0;
+
+/// Fewest steps.
+const LEAST_STEPS: usize = 60;
+
+/// The refinement of all keyframes together and what follows.
+pub(crate) struct Finish<'a> {
+    dataset: &'a Dataset,
+    settings: &'a MapSettings,
+    frames: Frames,
+}
+
+impl<'a> Finish<'a> {
+    /// Repairs the exposures of all frames, tells the keyframes what their neighbours suggest, fills what no depth map
+    /// showed, and starts the schedule.
+    pub(crate) fn new(
+        dataset: &'a Dataset,
+        bundle: &mut BundleAdjustment,
+        exposures: &[TimedExposure],
+        records: &[FrameRecord],
+        settings: &'a MapSettings,
+    ) -> Result<Self, MapError> {
+        let frames = Frames::of(dataset, exposures, records)?;
+        for k in 0..bundle.keyframes().len() {
+            let index = bundle.keyframes()[k].index;
+            bundle.set_prior(k, frames.priors[index]);
+            bundle.seed_from(k, DepthSource::Completed);
+        }
+        bundle.change_density();
+        bundle.start(Schedule::finish(steps(bundle)));
+        Ok(Self { dataset, settings, frames })
+    }
+
+    /// Refines, fits the frames between keyframes, and writes everything. `started` is when the run was.
+    pub(crate) fn run(
+        self,
+        mut bundle: BundleAdjustment,
+        writer: RunWriter,
+        started: Instant,
+        mut observe: impl FnMut(MapProgress),
+    ) -> Result<Summary, MapError> {
+        let budget = self.settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
+        let adjustment = Adjustment { budget, checkpoint: None, started: Instant::now(), earlier: 0.0 };
+        let mut running = Running::default();
+        adjustment.run(&mut bundle, &mut running, &mut observe)?;
+        running.seconds = started.elapsed().as_secs_f64();
+        conclude(self.dataset, bundle, self.frames, self.settings, writer, running)
+    }
+}
+
+/// Steps of the schedule: the effort of all keyframes, of which each step takes what its views cost.
+fn steps(bundle: &BundleAdjustment) -> usize {
+    let plan = Schedule::finish(1).plan(0.0, false);
+    let keyframes = bundle.keyframes().len();
+    let cost: f64 = (0..keyframes).map(|k| bundle.views(k, &plan) as f64 + STEP_COST).sum();
+    let mean_cost = cost / keyframes.max(1) as f64;
+    ((EFFORT * keyframes as f64 / mean_cost) as usize).max(LEAST_STEPS)
+}

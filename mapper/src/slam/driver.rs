@@ -1,0 +1,75 @@
+//! The run from start to end.
+
+use std::path::Path;
+use std::thread;
+use std::time::Instant;
+
+use super::back_end::BackEnd;
+use super::messages::link;
+use super::settings::SlamSettings;
+use super::{SlamError, front_end};
+use crate::dataset::Dataset;
+use crate::mapping::{Finish, MapError};
+use crate::run::{RunSettings, RunWriter, Summary};
+use crate::tracking::{TrackingError, tracker_config};
+
+/// Where a run stands.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SlamProgress {
+    /// Frames come in.
+    Frames {
+        /// Frames so far.
+        frames: usize,
+        /// Keyframes of the map.
+        keyframes: usize,
+        /// Gaussians now.
+        gaussians: usize,
+    },
+    /// The last frame was seen, all of the map is refined.
+    Refinement {
+        /// Share that is done, 0 to 1.
+        position: f64,
+        /// PSNR of blurred renderings against captured frames in dB.
+        psnr: f64,
+    },
+}
+
+/// Tracks and maps `dataset` at the same time into the RUN folder `out`. `describe` becomes the settings of the run;
+/// `observe` is called after every frame and every step of the refinement.
+///
+/// # Errors
+/// See [`SlamError`]. What was done before stays in `out`.
+pub fn run_slam(
+    dataset: &Dataset,
+    settings: &SlamSettings,
+    out: &Path,
+    describe: RunSettings,
+    mut observe: impl FnMut(SlamProgress),
+) -> Result<Summary, SlamError> {
+    let started = Instant::now();
+    let config = tracker_config(dataset, &settings.tracking());
+    config.validate().map_err(TrackingError::Camera)?;
+    let mut writer = RunWriter::create(out, describe)?;
+    dataset.warnings().iter().for_each(|warning| writer.warn(warning.to_string()));
+    let mut back_end = BackEnd::new(dataset, settings, writer);
+    let (tracker_link, mapper_link) = link();
+    thread::scope(|scope| {
+        let tracking = scope.spawn(|| front_end::run(dataset, &config, settings.arrival, tracker_link));
+        let mapped = back_end.run(mapper_link, &mut observe);
+        let tracked = tracking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        mapped?;
+        Ok::<_, SlamError>(tracked?)
+    })?;
+    let (grown, mut writer) = back_end.finish();
+    let mut bundle = grown.bundle;
+    if bundle.state.gaussians.is_empty() {
+        return Err(MapError::NoDepth.into());
+    }
+    let mapping = settings.mapping();
+    let finish = Finish::new(dataset, &mut bundle, writer.exposures(), writer.frames(), &mapping)?;
+    writer.flush()?;
+    let summary = finish.run(bundle, writer, started, |progress| {
+        observe(SlamProgress::Refinement { position: progress.position, psnr: progress.psnr });
+    })?;
+    Ok(summary)
+}

@@ -1,0 +1,147 @@
+//! The map while frames come in.
+
+use mba_tracker::SimdLevel;
+use mba_tracker::geometry::RigidTransform;
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+
+use super::keyframe_choice::{NEW_AREA, Neighbour, is_worth_it, most_dispensable, neighbours};
+use super::settings::SlamSettings;
+use crate::bundle::{
+    BundleAdjustment, DepthSource, FrameState, Keyframe, ObservationPyramid, PathPrior, Schedule, Sensor,
+};
+use crate::dataset::RgbdFrame;
+use crate::exposure::ExposurePath;
+use crate::mapping::PIXELS_PER_GAUSSIAN;
+use crate::trajectory_file::TimedExposure;
+
+/// Resolutions of an observation: full and half.
+const LEVELS: usize = 2;
+
+/// The coarser resolution.
+const COARSE: usize = 1;
+
+/// Work per frame, in virtual views of the coarser resolution.
+const EFFORT: f64 = 30.0;
+
+/// What a step costs besides its views, in views: comparing pictures and moving Gaussians.
+const STEP_COST: f64 = 2.0;
+
+/// Keyframes around the newest that are visited most.
+const WINDOW: usize = 8;
+
+/// A map is young until so many keyframes around the camera had so many visits each.
+const YOUNG_KEYFRAMES: usize = 3;
+const YOUNG_VISITS: u32 = 4;
+
+/// Steps between two changes of density.
+const DENSITY_EVERY: usize = 48;
+
+/// A map, its keyframes, and how work is spread over them.
+pub(super) struct GrowingMap {
+    pub(super) bundle: BundleAdjustment,
+    pub(super) sensor: Sensor,
+    settings: SlamSettings,
+    random: Pcg32,
+    /// Effort that is left over, or was taken in advance.
+    effort: f64,
+    steps: usize,
+    /// Pixels that showed something new, in pictures.
+    seen: f64,
+}
+
+impl GrowingMap {
+    pub(super) fn new(sensor: Sensor, settings: &SlamSettings) -> Self {
+        let pixels = sensor.camera.width * sensor.camera.height;
+        let bundle_settings = settings.mapping().bundle(pixels);
+        let level = SimdLevel::new();
+        let bundle = BundleAdjustment::new(level, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
+        let random = Pcg32::new(settings.seed, 0);
+        Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0 }
+    }
+
+    /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.
+    pub(super) fn take(&mut self, exposure: &TimedExposure, blur_px: f64, image: &RgbdFrame) -> bool {
+        let camera = self.sensor.camera;
+        let near = neighbours(&self.bundle, &exposure.mid, &camera);
+        let blur_px = if blur_px.is_finite() { blur_px } else { 0.0 };
+        let wanted = is_worth_it(&self.bundle, near.first(), blur_px, camera.width)
+            || self.bundle.open_share(&exposure.mid, COARSE) > NEW_AREA;
+        if !wanted {
+            return false;
+        }
+        let Some(observation) = ObservationPyramid::new(&self.sensor, image, LEVELS) else { return false };
+        let path = ExposurePath::through(exposure);
+        let path = if self.settings.blur { path } else { ExposurePath::still(path.mid()) };
+        let prior = PathPrior { middle: path.ends.mid(), motion: None };
+        let mut state = FrameState::new(path);
+        state.log_gain = near.first().map_or(0.0, |near| self.bundle.state.frames[near.keyframe].log_gain);
+        self.bundle.push(Keyframe::new(image.index, observation, prior), state);
+        self.seed();
+        if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
+            && let Some(k) = most_dispensable(&self.bundle, &camera)
+        {
+            self.bundle.retire(k);
+        }
+        true
+    }
+
+    /// Takes a better estimate of a frame that may be a keyframe.
+    pub(super) fn revise(&mut self, index: usize, exposure: &TimedExposure) {
+        let known = self.bundle.keyframes().iter().position(|keyframe| keyframe.index == index);
+        if let Some(k) = known.filter(|_| self.settings.blur) {
+            self.bundle.state.frames[k].path = ExposurePath::through(exposure);
+        }
+    }
+
+    /// Whether the map is good enough to track against: the keyframes around a pose were visited often enough.
+    pub(super) fn is_mature(&self, world_from_camera: &RigidTransform) -> bool {
+        let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
+        let visits = |near: &Neighbour| self.bundle.state.frames[near.keyframe].visits;
+        near.len() >= YOUNG_KEYFRAMES
+            && near.iter().take(YOUNG_KEYFRAMES).all(|near| visits(near) >= YOUNG_VISITS)
+    }
+
+    /// Adds what the newest keyframe shows, and allows the map to grow accordingly.
+    fn seed(&mut self) {
+        let newest = self.bundle.keyframes().len() - 1;
+        let pixels = (self.sensor.camera.width * self.sensor.camera.height) as f64;
+        let most = self.settings.max_gaussians.unwrap_or(usize::MAX);
+        let pose = self.bundle.state.frames[newest].path.mid();
+        self.seen += if newest == 0 { 1.0 } else { self.bundle.open_share(&pose, COARSE) };
+        let by_area = (self.seen * pixels) as usize / PIXELS_PER_GAUSSIAN;
+        self.bundle.allow(by_area.max(2000).min(most));
+        self.bundle.seed_from(newest, DepthSource::Measured);
+    }
+
+    /// A frame's share of the work, around a pose.
+    pub(super) fn work(&mut self, world_from_camera: &RigidTransform) {
+        if self.bundle.state.gaussians.is_empty() {
+            return;
+        }
+        let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
+        self.effort += EFFORT;
+        while self.effort > 0.0 {
+            let k = self.next_keyframe(&near);
+            let plan = Schedule::growing(self.bundle.state.frames[k].visits);
+            let report = self.bundle.visit(k, &plan);
+            self.effort -= report.views as f64 + STEP_COST;
+            self.steps += 1;
+            if self.steps.is_multiple_of(DENSITY_EVERY) {
+                self.bundle.change_density();
+            }
+        }
+    }
+
+    /// In turn the least visited of the window around the camera, and any one: what was learnt before must not be
+    /// forgotten.
+    fn next_keyframe(&mut self, near: &[Neighbour]) -> usize {
+        let visits = |near: &&Neighbour| self.bundle.state.frames[near.keyframe].visits;
+        let local = near.iter().take(WINDOW).min_by_key(visits).map_or(0, |near| near.keyframe);
+        if self.steps.is_multiple_of(2) {
+            return local;
+        }
+        let any = (u64::from(self.random.next_u32()) * near.len() as u64) >> 32;
+        near.get(any as usize).map_or(local, |near| near.keyframe)
+    }
+}

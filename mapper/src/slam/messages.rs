@@ -1,0 +1,71 @@
+//! What tracker and mapper say to each other. All queues are bounded.
+
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use mba_tracker::geometry::RigidTransform;
+
+use crate::dataset::RgbdFrame;
+use crate::run::FrameRecord;
+use crate::trajectory_file::TimedExposure;
+
+/// Frames that wait for the mapper at the most; the tracker waits for a place when there are more.
+const WAITING_FRAMES: usize = 4;
+
+/// From the tracker, one per frame of the data set, in order.
+#[derive(Debug)]
+pub(super) struct TrackedFrame {
+    /// Index in the data set.
+    pub(super) index: usize,
+    /// Poses in the world that the tracker had then.
+    pub(super) exposure: TimedExposure,
+    pub(super) record: FrameRecord,
+    /// Moves of the world that the tracker had made by then.
+    pub(super) moves: usize,
+    /// The frame itself, unless it was skipped.
+    pub(super) image: Option<RgbdFrame>,
+    /// Why it was skipped.
+    pub(super) skipped: Option<String>,
+    /// Index, exposure and blur in pixels of an earlier frame of which more is known now.
+    pub(super) revision: Option<(usize, TimedExposure, f64)>,
+}
+
+/// To the tracker, one after each frame.
+#[derive(Debug, Default)]
+pub(super) struct Instruction {
+    /// The world has changed: `new_world_from_world`.
+    pub(super) world_move: Option<RigidTransform>,
+    /// What the next frames are compared with.
+    pub(super) reference: Option<SharpView>,
+}
+
+/// A sharp view of the map.
+#[derive(Debug)]
+pub(super) struct SharpView {
+    /// Red, green, blue of each pixel as the camera would have stored them, row by row.
+    pub(super) rgb: Vec<u8>,
+    /// Depth in the data set's raw units, 0 where it is not known.
+    pub(super) depth: Vec<u16>,
+    pub(super) world_from_camera: RigidTransform,
+    /// The tracker is lost and is to start again near this view, from that pose.
+    pub(super) start_from: Option<RigidTransform>,
+}
+
+/// The tracker's ends of the two queues.
+pub(super) struct TrackerLink {
+    pub(super) frames: SyncSender<TrackedFrame>,
+    pub(super) instructions: Receiver<Instruction>,
+}
+
+/// The mapper's ends of the two queues.
+pub(super) struct MapperLink {
+    pub(super) frames: Receiver<TrackedFrame>,
+    pub(super) instructions: SyncSender<Instruction>,
+}
+
+/// Both queues. The mapper never waits for a place: between two looks of the tracker at its instructions it can have
+/// taken the waiting frames and the one that the tracker was handing over.
+pub(super) fn link() -> (TrackerLink, MapperLink) {
+    let (to_mapper, frames) = sync_channel(WAITING_FRAMES);
+    let (to_tracker, instructions) = sync_channel(WAITING_FRAMES + 2);
+    (TrackerLink { frames: to_mapper, instructions }, MapperLink { frames, instructions: to_tracker })
+}

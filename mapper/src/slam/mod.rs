@@ -1,0 +1,24 @@
+//! Tracking and mapping at the same time.
+//!
+//! Two threads and two bounded queues. The *front end* tracks one frame after the other; the *back end* takes them in,
+//! makes keyframes of those that show something new, adjusts map and exposures with a fixed effort per frame, and
+//! renders sharp views of the map near the camera, which the next frames are aligned with (MBA-SLAM section 3). In lock
+//! step the tracker follows the instructions of the frame before last, so that both threads are busy and the result is
+//! still the same on every machine.
+//!
+//! After the last frame all of the map is refined together with all paths, as [`crate::mapping`] does.
+
+mod back_end;
+mod driver;
+mod error;
+mod front_end;
+mod growing_map;
+mod keyframe_choice;
+mod messages;
+mod pace;
+mod settings;
+mod sharp_view;
+
+pub use driver::{SlamProgress, run_slam};
+pub use error::SlamError;
+pub use settings::{Arrival, SlamReference, SlamSettings};

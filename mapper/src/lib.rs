@@ -25,6 +25,7 @@ pub mod image_folders;
 pub mod infill;
 pub mod losses;
 pub mod mapping;
+pub mod places;
 mod png;
 pub mod pose_graph;
 pub mod raster;

@@ -9,6 +9,8 @@
 //! takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can go on. The
 //! result is another [`run`], with a map.
 //!
+//! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
+//!
 //! [`rendering`] makes images of a map, with [`infill`] where it has nothing; [`evaluation`] and [`image_folders`] compare
 //! results with the truth.
 
@@ -25,6 +27,7 @@ pub mod image_folders;
 pub mod infill;
 pub mod losses;
 pub mod mapping;
+pub mod places;
 mod png;
 pub mod pose_graph;
 pub mod raster;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{DepthSensor, Summary, SynthConfig, SynthSequence};
+use super::{CameraMotion, DepthSensor, Summary, SynthConfig, SynthSequence};
 
 /// `calibration.toml` of the sequence.
 pub(super) fn calibration(sequence: &SynthSequence) -> String {
@@ -35,6 +35,12 @@ pub(super) fn readme(sequence: &SynthSequence, summary: &Summary) -> String {
         Some(noise) => format!("{} e- full well, {} e- read noise", noise.full_well, noise.read_noise),
         None => "none".to_owned(),
     };
+    let way = match config.motion {
+        CameraMotion::Sweep => "",
+        CameraMotion::Loop => {
+            "The camera goes once round the scene; it ends near the place and heading of its start.\n"
+        }
+    };
     let depth = match config.depth {
         DepthSensor::Exact => "exact",
         DepthSensor::StructuredLight => {
@@ -45,7 +51,7 @@ pub(super) fn readme(sequence: &SynthSequence, summary: &Summary) -> String {
         "# Synthetic sequence: {scene}
 
 {frames} frames of {width}x{height} pixels at {frame_rate} Hz, exposure {exposure:.3} ms, seed {seed}.
-Blur from shutter opening to closing: mean {mean:.2} px, largest 95th percentile of a frame {p95:.2} px.
+{way}Blur from shutter opening to closing: mean {mean:.2} px, largest 95th percentile of a frame {p95:.2} px.
 Response {response}, gain {gain}, image noise: {noise}. Depth: {depth}.
 
 * rgb/: mean of 16 to {sub_frames} sub-frames over the exposure (number in blur.csv) in linear light, then gain,

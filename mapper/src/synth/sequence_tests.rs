@@ -5,7 +5,7 @@ use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
 use super::sequence::SynthSequence;
-use super::{DepthSensor, NoiseModel, SceneName, SynthConfig, SynthError};
+use super::{CameraMotion, DepthSensor, NoiseModel, SceneName, SynthConfig, SynthError};
 
 fn small() -> SynthConfig {
     SynthConfig { frames: 6, width: 96, height: 72, mean_blur_px: 2.0, ..SynthConfig::default() }
@@ -195,6 +195,67 @@ fn held_out_views_lie_between_frames_and_near_the_path() {
     }
     let still = self::sequence(SynthConfig { frames: 1, ..small() });
     assert_eq!(still.heldout_poses().len(), 1);
+}
+
+/// Share of the surface points of one frame that another one sees, and the points' share nearer than 8 m.
+fn shared_and_near(sequence: &SynthSequence, from: usize, to: usize) -> (f64, f64) {
+    let camera = sequence.camera();
+    let [world_from_a, world_from_b] = [from, to].map(|k| sequence.world_from_camera(sequence.timestamp(k)));
+    let depth = sequence.render_frame(from).depth;
+    let metres = |pixel: usize| f64::from(depth[pixel]) / 5000.0;
+    let is_seen = |pixel: &usize| {
+        let ray = camera.ray((pixel % camera.width) as f64, (pixel / camera.width) as f64);
+        let point = world_from_a.transform_point(&(ray * metres(*pixel)));
+        let here = world_from_b.inverse().transform_point(&point);
+        let place = camera.project(&here);
+        here.z > 0.1
+            && (0.0..camera.width as f64).contains(&place.x)
+            && (0.0..camera.height as f64).contains(&place.y)
+    };
+    let near = (0..depth.len()).filter(|pixel| (0.4..8.0).contains(&metres(*pixel))).count();
+    let share = |count: usize| count as f64 / depth.len() as f64;
+    (share((0..depth.len()).filter(is_seen).count()), share(near))
+}
+
+#[test]
+fn a_loop_ends_where_it_began_and_sees_nothing_of_that_half_way() {
+    for scene in SceneName::ALL {
+        let config = SynthConfig {
+            scene,
+            motion: CameraMotion::Loop,
+            frames: 41,
+            frame_rate: 5.0,
+            mean_blur_px: 3.0,
+            ..small()
+        };
+        let sequence = sequence(config);
+        let path = |time: f64| sequence.world_from_camera(time);
+        let ends = path(sequence.timestamp(0)).tangent_to(&path(sequence.timestamp(40)));
+        // Twice the play of the hand.
+        assert!(ends.fixed_rows::<3>(0).norm() < 0.3, "{scene}: {ends}");
+        assert!(shared_and_near(&sequence, 40, 0).0 > 0.5, "{scene}");
+        assert!(shared_and_near(&sequence, 20, 0).0 < 0.02, "{scene}");
+        for frame in (0..40).step_by(4) {
+            let (next, near) = shared_and_near(&sequence, frame, frame + 1);
+            assert!(next > 0.3 && near > 0.7, "{scene}, frame {frame}: {next} shared, {near} near");
+        }
+        let mean = (0..41).map(|index| sequence.blur(index).mean_px).sum::<f64>() / 41.0;
+        assert!((mean - 3.0).abs() < 0.05, "{scene}: {mean} px");
+    }
+}
+
+#[test]
+fn a_loop_cannot_have_less_blur_than_its_way() {
+    let hasty = SynthConfig { motion: CameraMotion::Loop, frames: 30, mean_blur_px: 0.5, ..small() };
+    let error = SynthSequence::new(hasty).err().unwrap();
+    let SynthError::BlurOfTheWay { requested, least } = error else { panic!("{error}") };
+    // A turn of 360 degrees in 29 intervals, 16 ms of 33.3 ms each: 0.104 rad, at 75 px and more away from the middle.
+    assert!(requested == 0.5 && (7.5..14.0).contains(&least), "{least}");
+    let still = sequence(SynthConfig { mean_blur_px: 0.0, ..hasty });
+    let blur = (0..30).map(|index| still.blur(index).mean_px).sum::<f64>() / 30.0;
+    assert!((blur - least).abs() < 0.2, "without shake there is the way: {blur} px");
+    let ends = still.world_from_camera(0.1).tangent_to(&still.world_from_camera(0.1 + 29.0 / 30.0));
+    assert!(ends.norm() < 1e-4, "{ends}");
 }
 
 #[test]

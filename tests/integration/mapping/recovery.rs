@@ -3,7 +3,7 @@
 use mba_mapper::evaluation::motion_of;
 use mba_mapper::mapping::MapSettings;
 use mba_mapper::run::Run;
-use mba_mapper::synth::{DepthSensor, ResponseCurve, SceneName, SynthConfig};
+use mba_mapper::synth::{CameraMotion, DepthSensor, ResponseCurve, SceneName, SynthConfig};
 use mba_mapper::trajectory_file::TimedExposure;
 use mba_tests::blurred_sequence::BlurredSequence;
 use mba_tests::handheld::exposure_errors;
@@ -14,6 +14,7 @@ use nalgebra::Vector6;
 /// Too small for the tracker, which is not asked here.
 const CONFIG: SynthConfig = SynthConfig {
     scene: SceneName::Room,
+    motion: CameraMotion::Sweep,
     frames: 9,
     width: 128,
     height: 96,

@@ -40,9 +40,10 @@ pub fn slam_into(
 ) -> anyhow::Result<Summary> {
     let progress = console.progress(dataset.len(), "frames");
     let observe = |at: SlamProgress| match at {
-        SlamProgress::Frames { frames, keyframes, gaussians } => {
+        SlamProgress::Frames { frames, keyframes, gaussians, loops } => {
             progress.set_position(frames as u64);
-            progress.set_message(format!("frames: {keyframes} keyframes, {gaussians} Gaussians"));
+            progress
+                .set_message(format!("frames: {keyframes} keyframes, {gaussians} Gaussians, {loops} loops"));
         }
         SlamProgress::Refinement { position, psnr } => {
             progress.set_length(REFINEMENT_STEPS);

@@ -64,7 +64,7 @@ pub struct BundleState {
     /// The map.
     pub gaussians: Gaussians,
     /// What is kept of every Gaussian besides.
-    ledger: Ledger,
+    pub(super) ledger: Ledger,
     /// One per keyframe.
     pub frames: Vec<FrameState>,
     /// Steps made.
@@ -80,7 +80,7 @@ pub struct BundleState {
 pub struct BundleAdjustment {
     /// What was estimated so far.
     pub state: BundleState,
-    keyframes: Vec<Keyframe>,
+    pub(super) keyframes: Vec<Keyframe>,
     settings: BundleSettings,
     schedule: Schedule,
     sensor: Sensor,
@@ -257,7 +257,8 @@ impl BundleAdjustment {
         if plan.path_pixels > 0.0 {
             // One view says nothing about the motion.
             let still = !self.settings.blur || views == 1;
-            let step = PathStep { pixels: plan.path_pixels, hold_middle: is_first, still };
+            let hold = [is_first || plan.only_motions, still, still || plan.only_motions];
+            let step = PathStep { pixels: plan.path_pixels, hold };
             frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, &keyframe.metric, step);
             if !is_first {
                 frame.log_gain += frame.gain_moments.step(loss.by_log_gain, plan.log_gain);
@@ -283,7 +284,8 @@ impl BundleAdjustment {
             if loss.terms.total() < least {
                 (best, least) = (frame.clone(), loss.terms.total());
             }
-            let step = PathStep { pixels: 0.3 * shrink, hold_middle: false, still: !self.settings.blur };
+            let still = !self.settings.blur;
+            let step = PathStep { pixels: 0.3 * shrink, hold: [false, still, still] };
             frame.path_moments.step(&mut frame.path, &loss.by_path, &unmapped.prior, &unmapped.metric, step);
             frame.log_gain += frame.gain_moments.step(loss.by_log_gain, 0.01 * shrink);
         }

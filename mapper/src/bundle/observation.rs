@@ -21,6 +21,31 @@ pub struct Observation {
     pub region: PixelRectangle,
 }
 
+impl Observation {
+    /// Colours as stored: red, green and blue of each pixel, row by row.
+    #[must_use]
+    pub fn rgb(&self) -> Vec<u8> {
+        let [red, green, blue] = &self.colour;
+        red.iter().zip(green).zip(blue).flat_map(|((red, green), blue)| [*red, *green, *blue]).collect()
+    }
+
+    /// The frame that was captured, with `depth_scale` raw units per metre of depth; it has no times.
+    #[must_use]
+    pub fn frame(&self, index: usize, depth_scale: f64) -> RgbdFrame {
+        // Casts saturate, and raw depths have come from 16 bits.
+        let raw = |depth: &f32| (f64::from(*depth) * depth_scale).round() as u16;
+        RgbdFrame {
+            index,
+            timestamp: 0.0,
+            exposure_seconds: 0.0,
+            width: self.camera.width,
+            height: self.camera.height,
+            rgb: self.rgb(),
+            depth: self.depth.iter().map(raw).collect(),
+        }
+    }
+}
+
 /// A captured frame at full resolution and at halves of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObservationPyramid {

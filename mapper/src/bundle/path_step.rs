@@ -61,10 +61,8 @@ pub struct PathPrior {
 pub struct PathStep {
     /// Typical movement of the picture, units of the metric.
     pub pixels: f64,
-    /// The middle stays where it is.
-    pub hold_middle: bool,
-    /// Motion and bow stay as they are.
-    pub still: bool,
+    /// Whether middle, motion and bow stay as they are.
+    pub hold: [bool; 3],
 }
 
 impl PathMoments {
@@ -91,12 +89,8 @@ impl PathMoments {
             *mean = mean_now.into();
             moves[block] = capped(mean_now * scale, LONGEST * step.pixels);
         }
-        if step.hold_middle {
-            moves[0].fill(0.0);
-        }
-        if step.still {
-            moves[1..].iter_mut().for_each(|block| block.fill(0.0));
-        }
+        let held = moves.iter_mut().zip(step.hold).filter(|(_, hold)| *hold);
+        held.for_each(|(block, _)| block.fill(0.0));
         self.bow_units = (Vector6::from(self.bow_units) + moves[2]).into();
         let tangents = moves.map(|units| metric.tangent(path, &units));
         *path = path.perturbed(&from_coordinates(&tangents));
@@ -182,7 +176,7 @@ mod tests {
             gradient.fixed_rows_mut::<6>(0).copy_from(&(a * 0.5 - b));
             gradient.fixed_rows_mut::<6>(6).copy_from(&(a * 0.5 + b));
             gradient.fixed_rows_mut::<6>(12).copy_from(&c);
-            let step = PathStep { pixels: 0.1 * 0.98_f64.powi(k), hold_middle, still: false };
+            let step = PathStep { pixels: 0.1 * 0.98_f64.powi(k), hold: [hold_middle, false, false] };
             moments.step(&mut path, &gradient, prior, &metric, step);
         }
         state(&path)
@@ -220,7 +214,7 @@ mod tests {
         // The noise of a picture that says nothing.
         let noise = |k: i32| SMatrix::<f64, PATH_PARAMETERS, 1>::repeat(0.02 * f64::from(1 - 2 * (k % 2)));
         for k in 0..3000 {
-            let step = PathStep { pixels: 0.05, hold_middle: false, still: false };
+            let step = PathStep { pixels: 0.05, hold: [false; 3] };
             moments.step(&mut path, &noise(k), &prior, &metric, step);
         }
         let [off, missing] = [path.ends.mid().tangent_to(&prior.middle), path.ends.motion() - motion];

@@ -18,6 +18,8 @@ pub struct StepPlan {
     pub lengths: StepLengths,
     /// Step length of the paths, full-resolution pixels.
     pub path_pixels: f64,
+    /// Whether paths keep their poses at mid exposure, and only the motion around them changes.
+    pub only_motions: bool,
     /// Step length of the logarithms of the gains.
     pub log_gain: f64,
     /// Weights of the losses.
@@ -69,9 +71,9 @@ struct Pace {
 const WHOLE: Pace =
     Pace { hold: 0.25, final_length: 0.03, paths_from: 0.3, path_pixels: 0.03, density_changes: 16.0 };
 /// From a map that has grown frame by frame to a finished one, in a fraction of the time: steps may not become short
-/// before the details are there, and paths, tracked against the map already, have little left to go.
+/// before the details are there, and paths, which are tracked, have little left to go.
 const FINISH: Pace =
-    Pace { hold: 0.2, final_length: 0.2, paths_from: 0.0, path_pixels: 0.015, density_changes: 6.0 };
+    Pace { hold: 0.2, final_length: 0.3, paths_from: 0.3, path_pixels: 0.015, density_changes: 6.0 };
 /// Position from which the density is final.
 const DENSITY_UNTIL: f64 = 0.6;
 /// Visits from which the path of a keyframe moves while the map grows.
@@ -102,7 +104,8 @@ impl Schedule {
         Self { stages: vec![fine, last], pace: FINISH }
     }
 
-    /// The plan of a step while the map grows, on a keyframe that had so many visits.
+    /// The plan of a step while the map grows, on a keyframe that had so many visits: motions change, the poses at mid
+    /// exposure, which the tracker has measured against depth, do not. A map without details would pull them together.
     #[must_use]
     pub fn growing(visits: u32) -> StepPlan {
         let paths = if visits < SETTLED { 0.0 } else { 1.0 };
@@ -112,6 +115,7 @@ impl Schedule {
             max_views: 9,
             lengths: LENGTHS,
             path_pixels: FINISH.path_pixels * paths,
+            only_motions: true,
             log_gain: LOG_GAIN * paths,
             weights: WEIGHTS,
         }
@@ -154,6 +158,7 @@ impl Schedule {
             max_views: stage.max_views,
             lengths: LENGTHS.scaled(shrink as f32),
             path_pixels: path_pixels * paths,
+            only_motions: false,
             log_gain: LOG_GAIN * paths,
             weights: WEIGHTS,
         }
@@ -199,7 +204,7 @@ mod tests {
         assert_eq!(schedule.steps(), 100);
         let [start, end] = [0.0, 1.0].map(|position| schedule.plan(position, false));
         assert!(start.level == 0 && start.path_pixels > 0.0 && end.spacing < start.spacing);
-        assert!((end.lengths.mean / start.lengths.mean - 0.2).abs() < 1e-3);
+        assert!((end.lengths.mean / start.lengths.mean - 0.3).abs() < 1e-3);
         assert_eq!(Schedule::growing(0).path_pixels, 0.0);
         assert_eq!(Schedule::growing(SETTLED).path_pixels, start.path_pixels);
     }

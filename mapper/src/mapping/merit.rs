@@ -87,7 +87,7 @@ fn keyframe_scores(dataset: &Dataset, bundle: &BundleAdjustment, folder: &Path) 
         let name = format!("{:06}.png", keyframe.index);
         let Some(truth) = read(&dataset.folder().join(SHARP_FOLDER).join(name)) else { continue };
         let Some(deblurred) = read(&deblurred_path(folder, keyframe.index)) else { continue };
-        scores[0].add_picture(&truth, &interleaved(&keyframe.observation.level(0).colour));
+        scores[0].add_picture(&truth, &keyframe.observation.level(0).rgb());
         scores[1].add_picture(&truth, &deblurred.rgb);
     }
     scores
@@ -119,8 +119,4 @@ fn read(path: &Path) -> Option<Picture> {
     let image = ImageReader::open(path).ok()?.decode().ok()?.into_rgb8();
     let size = [image.width() as usize, image.height() as usize];
     Some(Picture { size, rgb: image.into_raw() })
-}
-
-fn interleaved([red, green, blue]: &[Vec<u8>; 3]) -> Vec<u8> {
-    red.iter().zip(green).zip(blue).flat_map(|((red, green), blue)| [*red, *green, *blue]).collect()
 }

@@ -20,4 +20,3 @@ pub use error::MapError;
 pub(crate) use finish::Finish;
 pub(crate) use prepare::sensor;
 pub use settings::MapSettings;
-pub(crate) use settings::PIXELS_PER_GAUSSIAN;

@@ -40,7 +40,7 @@ impl Default for MapSettings {
 }
 
 /// Image pixels per Gaussian: what a camera sees is described by a third as many Gaussians as it has pixels.
-pub(crate) const PIXELS_PER_GAUSSIAN: usize = 3;
+const PIXELS_PER_GAUSSIAN: usize = 3;
 
 /// The settings that change the result, for the identity of a checkpoint.
 #[derive(Serialize)]

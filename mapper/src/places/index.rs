@@ -40,6 +40,11 @@ impl PlaceIndex {
         self.places.push((id, descriptor));
     }
 
+    /// Forgets the views whose number is not kept.
+    pub fn retain(&mut self, is_kept: impl Fn(usize) -> bool) {
+        self.places.retain(|(id, _)| is_kept(*id));
+    }
+
     /// The views that look most like `query`, best first: at most `most` of those whose similarity is at least
     /// `min_similarity` (-1 to 1) and whose number is eligible. Of equal similarity, the lower number comes first.
     #[must_use]

@@ -4,6 +4,8 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use mba_tracker::geometry::RigidTransform;
+
 use super::keyframe_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
@@ -82,6 +84,14 @@ impl RunWriter {
             record.blur_px = blur_px;
             self.unwritten += 1;
         }
+    }
+
+    /// Moves every exposure to another world, which may be another one for each frame: `new_world_from_world` by index.
+    pub fn move_world(&mut self, new_world_from_world: impl Fn(usize) -> RigidTransform) {
+        for (index, exposure) in self.exposures.iter_mut().enumerate() {
+            *exposure = exposure.seen_from(&new_world_from_world(index));
+        }
+        self.unwritten += self.exposures.len();
     }
 
     /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map;
@@ -209,7 +219,6 @@ impl Drop for RunWriter {
 
 #[cfg(test)]
 mod tests {
-    use mba_tracker::geometry::RigidTransform;
     use nalgebra::Vector3;
 
     use super::super::{FrameStatus, Run, RunCamera};

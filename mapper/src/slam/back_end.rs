@@ -1,29 +1,51 @@
 //! The mapper's side of the loop.
 
+use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::RigidTransform;
 
 use super::driver::SlamProgress;
 use super::growing_map::GrowingMap;
-use super::messages::{Instruction, MapperLink, TrackedFrame};
+use super::loops::Loops;
+use super::messages::{Instruction, MapperLink, SharpView, TrackedFrame};
 use super::settings::{SlamReference, SlamSettings};
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
 use crate::run::{FrameStatus, RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
 
+/// Frames between two comparisons of map and keyframe as references.
+const JUDGE_EVERY: usize = 8;
+
 /// Takes tracked frames, grows the map, and tells the tracker what to do.
 pub(super) struct BackEnd {
     map: GrowingMap,
+    loops: Loops,
     settings: SlamSettings,
     writer: RunWriter,
     /// Every move of the world so far, `new_world_from_world`.
     moves: Vec<RigidTransform>,
+    /// Whether frames are aligned with the map.
+    on_map: bool,
+    /// Frames since that was decided.
+    undisputed: usize,
 }
 
 impl BackEnd {
-    pub(super) fn new(dataset: &Dataset, settings: &SlamSettings, writer: RunWriter) -> Self {
-        let map = GrowingMap::new(sensor(dataset), settings);
-        Self { map, settings: *settings, writer, moves: Vec::new() }
+    pub(super) fn new(
+        dataset: &Dataset,
+        config: &TrackerConfig,
+        settings: &SlamSettings,
+        writer: RunWriter,
+    ) -> Self {
+        Self {
+            map: GrowingMap::new(sensor(dataset), settings),
+            loops: Loops::new(config),
+            settings: *settings,
+            writer,
+            moves: Vec::new(),
+            on_map: false,
+            undisputed: 0,
+        }
     }
 
     /// Works until the tracker has no more frames.
@@ -40,6 +62,7 @@ impl BackEnd {
                 frames: self.writer.exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),
                 gaussians: self.map.bundle.state.gaussians.len(),
+                loops: self.loops.closed(),
             });
         }
         Ok(())
@@ -64,16 +87,78 @@ impl BackEnd {
             return Ok(Instruction::default());
         };
         self.writer.push(exposure, frame.record)?;
-        if frame.record.status == FrameStatus::Lost {
-            return Ok(Instruction::default());
+        match frame.record.status {
+            FrameStatus::Lost => {
+                let reference = self.loops.find(&self.map, &image);
+                Ok(Instruction { world_move: None, reference })
+            }
+            FrameStatus::Ok => Ok(self.map_frame(exposure, frame.record.blur_px, &image)),
+            FrameStatus::Weak => {
+                self.map.work(&exposure.mid);
+                Ok(Instruction::default())
+            }
         }
-        if frame.record.status == FrameStatus::Ok {
-            self.map.take(&exposure, frame.record.blur_px, &image);
+    }
+
+    /// Takes in a frame whose pose can be trusted.
+    fn map_frame(&mut self, exposure: TimedExposure, blur_px: f64, image: &RgbdFrame) -> Instruction {
+        let mut world_move = None;
+        let mut pose = exposure.mid;
+        if self.map.take(&exposure, blur_px, image) {
+            self.loops.remember(&self.map, image);
+            if self.settings.loops {
+                world_move = self.close_loop(image);
+            }
         }
-        self.map.work(&exposure.mid);
-        let wanted = self.settings.reference == SlamReference::Map && self.map.is_mature(&exposure.mid);
-        let reference = if wanted { self.map.sharp_view(&exposure.mid) } else { None };
-        Ok(Instruction { world_move: None, reference })
+        if let Some(new_world_from_world) = &world_move {
+            pose = new_world_from_world.compose(&pose);
+        }
+        self.map.work(&pose);
+        Instruction { world_move, reference: self.reference(&pose, image) }
+    }
+
+    /// Moves map and run if the newest keyframe shows that they have drifted; returns what happened around it.
+    fn close_loop(&mut self, image: &RgbdFrame) -> Option<RigidTransform> {
+        let poses = self.loops.correct(&self.map, image)?;
+        let moves = self.map.bundle.move_keyframes(&poses);
+        self.writer.move_world(|index| moves.of(index));
+        self.moves.push(moves.last());
+        Some(moves.last())
+    }
+
+    /// A view for the frames after that from `pose`, if the tracker should change to one.
+    fn reference(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> Option<SharpView> {
+        if self.settings.reference != SlamReference::Map || !self.map.is_mature(pose) {
+            return None;
+        }
+        self.undisputed += 1;
+        if self.undisputed >= JUDGE_EVERY {
+            self.undisputed = 0;
+            let was_on_map = self.on_map;
+            let (is_better, keyframe) = self.judge(pose, image);
+            self.on_map = is_better;
+            if was_on_map && !self.on_map {
+                return keyframe;
+            }
+        }
+        if self.on_map { self.map.sharp_view(pose) } else { None }
+    }
+
+    /// Whether the map explains a frame better than the nearest keyframe does, and that keyframe as a view.
+    fn judge(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> (bool, Option<SharpView>) {
+        let look = self.loops.look();
+        let Some(keyframe) = self.map.nearest_other(pose, image.index) else { return (false, None) };
+        let bundle = &self.map.bundle;
+        let (known, state) = (&bundle.keyframes()[keyframe], &bundle.state.frames[keyframe]);
+        let keyframe_view = look.keyframe_view(known, state, self.map.sensor.depth_scale);
+        let mut residual = |view: &SharpView| look.align(image, view, pose).map(|sighting| sighting.residual);
+        let on_keyframe = residual(&keyframe_view);
+        let on_map = self.map.sharp_view(pose).and_then(|view| residual(&view));
+        let is_better = match (on_map, on_keyframe) {
+            (Some(map), Some(keyframe)) => map < keyframe,
+            (on_map, _) => on_map.is_some(),
+        };
+        (is_better, Some(keyframe_view))
     }
 
     /// An exposure that was estimated when the world had moved `moves` times.

@@ -24,6 +24,8 @@ pub enum SlamProgress {
         keyframes: usize,
         /// Gaussians now.
         gaussians: usize,
+        /// Loops that were closed.
+        loops: usize,
     },
     /// The last frame was seen, all of the map is refined.
     Refinement {
@@ -51,7 +53,7 @@ pub fn run_slam(
     config.validate().map_err(TrackingError::Camera)?;
     let mut writer = RunWriter::create(out, describe)?;
     dataset.warnings().iter().for_each(|warning| writer.warn(warning.to_string()));
-    let mut back_end = BackEnd::new(dataset, settings, writer);
+    let mut back_end = BackEnd::new(dataset, &config, settings, writer);
     let (tracker_link, mapper_link) = link();
     thread::scope(|scope| {
         let tracking = scope.spawn(|| front_end::run(dataset, &config, settings.arrival, tracker_link));

@@ -1,17 +1,18 @@
 //! The tracker's thread.
 
+use std::collections::VecDeque;
 use std::time::Instant;
 
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
-use mba_tracker::image::{ColourView, DepthView, PixelFormat};
-use mba_tracker::{ReferenceView, SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
 
 use super::messages::{Instruction, SharpView, TrackedFrame, TrackerLink};
 use super::pace::Pace;
 use super::settings::Arrival;
 use crate::dataset::Dataset;
 use crate::tracking::{TrackingError, held, record, timed, tracker_view};
+use crate::trajectory_file::TimedExposure;
 
 /// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
 /// tracked.
@@ -26,14 +27,14 @@ struct FrontEnd<'a, 'm> {
     given: Given,
     moves: usize,
     /// The last exposure, for frames without one.
-    last: Option<crate::trajectory_file::TimedExposure>,
+    last: Option<TimedExposure>,
 }
 
 /// The tracker counts the frames it was given, the run those of the data set; only the last few are asked for.
 #[derive(Default)]
 struct Given {
     count: usize,
-    recent: std::collections::VecDeque<usize>,
+    recent: VecDeque<usize>,
 }
 
 impl Given {
@@ -149,18 +150,7 @@ impl FrontEnd<'_, '_> {
     }
 
     fn take_reference(&mut self, view: &SharpView) -> Result<(), TrackError> {
-        let camera = self.dataset.calibration().camera;
-        let reference = ReferenceView {
-            colour: ColourView::new(
-                &view.rgb,
-                camera.width,
-                camera.height,
-                3 * camera.width,
-                PixelFormat::Rgb8,
-            )?,
-            depth: DepthView::new(&view.depth, camera.width, camera.height, camera.width)?,
-            world_from_camera: view.world_from_camera,
-        };
+        let reference = view.reference(&self.dataset.calibration().camera)?;
         match &view.start_from {
             Some(world_from_camera) => self.tracker.relocate(&reference, world_from_camera),
             None => self.tracker.set_reference(&reference),

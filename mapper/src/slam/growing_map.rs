@@ -12,7 +12,6 @@ use crate::bundle::{
 };
 use crate::dataset::RgbdFrame;
 use crate::exposure::ExposurePath;
-use crate::mapping::PIXELS_PER_GAUSSIAN;
 use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.
@@ -26,6 +25,9 @@ const EFFORT: f64 = 30.0;
 
 /// What a step costs besides its views, in views: comparing pictures and moving Gaussians.
 const STEP_COST: f64 = 2.0;
+
+/// Pixels that show something new per Gaussian.
+const PIXELS_PER_GAUSSIAN: usize = 6;
 
 /// Keyframes around the newest that are visited most.
 const WINDOW: usize = 8;
@@ -100,6 +102,13 @@ impl GrowingMap {
         let visits = |near: &Neighbour| self.bundle.state.frames[near.keyframe].visits;
         near.len() >= YOUNG_KEYFRAMES
             && near.iter().take(YOUNG_KEYFRAMES).all(|near| visits(near) >= YOUNG_VISITS)
+    }
+
+    /// The keyframe with the view nearest to a pose, other than frame `index` itself.
+    pub(super) fn nearest_other(&self, world_from_camera: &RigidTransform, index: usize) -> Option<usize> {
+        let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
+        let mut keyframes = near.iter().map(|near| near.keyframe);
+        keyframes.find(|&k| self.bundle.keyframes()[k].index != index)
     }
 
     /// Adds what the newest keyframe shows, and allows the map to grow accordingly.

@@ -2,7 +2,10 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-use mba_tracker::geometry::RigidTransform;
+use mba_tracker::ReferenceView;
+use mba_tracker::error::FrameError as TrackError;
+use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 
 use crate::dataset::RgbdFrame;
 use crate::run::FrameRecord;
@@ -48,6 +51,18 @@ pub(super) struct SharpView {
     pub(super) world_from_camera: RigidTransform,
     /// The tracker is lost and is to start again near this view, from that pose.
     pub(super) start_from: Option<RigidTransform>,
+}
+
+impl SharpView {
+    /// The view as the tracker takes it.
+    pub(super) fn reference(&self, camera: &PinholeCamera) -> Result<ReferenceView<'_>, TrackError> {
+        let PinholeCamera { width, height, .. } = *camera;
+        Ok(ReferenceView {
+            colour: ColourView::new(&self.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,
+            depth: DepthView::new(&self.depth, width, height, width)?,
+            world_from_camera: self.world_from_camera,
+        })
+    }
 }
 
 /// The tracker's ends of the two queues.

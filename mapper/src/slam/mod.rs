@@ -14,8 +14,10 @@ mod error;
 mod front_end;
 mod growing_map;
 mod keyframe_choice;
+mod loops;
 mod messages;
 mod pace;
+mod second_look;
 mod settings;
 mod sharp_view;
 

@@ -33,6 +33,7 @@ pub mod synth;
 mod text_lines;
 pub mod tracking;
 pub mod trajectory_file;
+pub mod triplane;
 mod whole_file;
 
 pub use error::FileError;

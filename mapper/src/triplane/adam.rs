@@ -29,6 +29,13 @@ pub struct FieldStep {
     pub log_sharpness: f32,
 }
 
+impl Default for FieldStep {
+    /// Two to three times those of ESLAM, for a schedule that ends with much shorter ones.
+    fn default() -> Self {
+        Self { planes: 0.01, decoders: 3e-3, log_sharpness: 1e-3 }
+    }
+}
+
 impl FieldStep {
     /// All lengths times `factor`.
     #[must_use]

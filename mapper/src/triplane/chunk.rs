@@ -17,9 +17,6 @@ use crate::bundle::{CLIPPED, DisplayCurve, NOISE, Observation, smooth_absolute};
 /// Pixels per chunk: what belongs to one stays in the cache of a core.
 pub(super) const CHUNK: usize = 32;
 
-/// Samples with less weight are not looked at: they would change no stored colour.
-const LEAST_WEIGHT: f32 = 1e-3;
-
 /// Half the width of the centre of the band, truncations (ESLAM).
 const CENTRE: f32 = 0.4;
 
@@ -29,7 +26,6 @@ pub(super) struct View {
     /// From the camera to the field's coordinates.
     pub(super) field_from_camera: Motion,
     pub(super) mid_from_camera: Motion,
-    /// Farthest depth, metres.
     pub(super) world_from_camera: RigidTransform,
 }
 
@@ -206,7 +202,8 @@ impl Chunk {
         }
         self.lit.clear();
         self.colour.clear();
-        for (sample, _) in self.weights.iter().enumerate().filter(|(_, weight)| **weight > LEAST_WEIGHT) {
+        let least = job.sampling.least_weight;
+        for (sample, _) in self.weights.iter().enumerate().filter(|(_, weight)| **weight > least) {
             self.lit.push(sample as u32);
             self.colour.push(self.geometry.points.each_ref().map(|axis| axis[sample]));
         }

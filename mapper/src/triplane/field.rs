@@ -8,9 +8,6 @@ use super::planes::FeaturePlanes;
 use super::region::Region;
 use super::settings::FieldSettings;
 
-/// First sharpness of surfaces (ESLAM).
-const SHARPNESS: f32 = 10.0;
-
 /// Signed distances start at about the hyperbolic tangent of this: space is empty until something was seen in it.
 const EMPTY: f32 = 0.5;
 
@@ -45,7 +42,7 @@ impl TriplaneField {
         distance_decoder.last_bias = [EMPTY];
         let colour_decoder = Layers::random(&mut random);
         let [geometry, colour] = planes(&region, &settings, seed);
-        let log_sharpness = SHARPNESS.ln();
+        let log_sharpness = settings.sharpness.ln();
         Self { region, settings, seed, geometry, colour, distance_decoder, colour_decoder, log_sharpness }
     }
 

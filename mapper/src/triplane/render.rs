@@ -40,7 +40,8 @@ impl FieldRenderer {
         Self { level, sampling }
     }
 
-    /// The view of `camera` from a pose: linear light, depth as a sum with the weights of the samples, alpha.
+    /// The view of `camera` from a pose: linear light, alpha, and the depth where the signed distance is zero, times
+    /// alpha. The sum of depths with the weights of samples would lie in front of the surface, more so the softer it is.
     #[must_use]
     pub fn render(
         &self,
@@ -97,19 +98,16 @@ impl FieldRenderer {
         weights.resize(count, 0.0);
         let mut start = 0;
         let mut seen = |surface: &Option<f32>| -> Seen {
-            if surface.is_none() {
-                return ([0.0; 3], 0.0, 0.0);
-            }
+            let Some(surface) = surface else { return ([0.0; 3], 0.0, 0.0) };
             let range = start..start + count;
             start += count;
             let alpha = weigh(&opacities[range.clone()], weights);
-            let (mut light, mut depth) = ([0.0; 3], 0.0);
+            let mut light = [0.0; 3];
             for (weight, sample) in weights.iter().zip(range) {
-                depth += weight * z[sample];
                 let pairs = light.iter_mut().zip(colour.values[sample]);
                 pairs.for_each(|(light, colour)| *light += weight * colour);
             }
-            (light, depth, alpha)
+            (light, surface * alpha, alpha)
         };
         surfaces.iter().map(&mut seen).collect()
     }

@@ -19,11 +19,13 @@ pub struct SamplingSettings {
     pub surface_reach: f32,
     /// Along a ray that meets no surface.
     pub open: usize,
+    /// Samples with less weight in their ray have no colour: 1e-3 changes no stored value.
+    pub least_weight: f32,
 }
 
 impl Default for SamplingSettings {
     fn default() -> Self {
-        Self { front: 3, band: 10, surface: 7, surface_reach: 0.6, open: 12 }
+        Self { front: 3, band: 10, surface: 7, surface_reach: 0.6, open: 12, least_weight: 1e-3 }
     }
 }
 

@@ -132,7 +132,7 @@ impl TriplaneAdam {
         let planes: Vec<_> =
             plane_values_mut(field).into_iter().zip(moments).zip(&mut gradients.planes).collect();
         planes.into_par_iter().for_each(|((values, (first, second)), gradient)| {
-            if gradient.sums.len() == values.len() {
+            if [gradient.sums.len(), first.len(), second.len()] == [values.len(); 3] {
                 dispatch!(level, simd => step_plane(simd, values, [first, second], gradient, step.planes));
             }
             gradient.clear();

@@ -16,6 +16,7 @@ const SPREAD: f32 = 0.017_320_508;
 
 /// Features on the nodes of three planes over a box of space; their sum at a point is the feature there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Stored")]
 pub(super) struct FeaturePlanes {
     /// Cells along one coarse cell.
     pub(super) refinement: u32,
@@ -28,6 +29,32 @@ pub(super) struct FeaturePlanes {
 /// All values of a plane; a checkpoint keeps every bit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct PlaneValues(#[serde(with = "exact_floats")] pub(super) Vec<f32>);
+
+/// Planes as they are read, before it is known whether they fit together.
+#[derive(Deserialize)]
+struct Stored {
+    refinement: u32,
+    nodes: [usize; 3],
+    values: [PlaneValues; 3],
+}
+
+impl TryFrom<Stored> for FeaturePlanes {
+    type Error = &'static str;
+
+    fn try_from(Stored { refinement, nodes, values }: Stored) -> Result<Self, Self::Error> {
+        let fits = |([u, v], plane): ([usize; 2], &PlaneValues)| {
+            let count = nodes[u].checked_mul(nodes[v]).and_then(|nodes| nodes.checked_mul(CHANNELS));
+            count == Some(plane.0.len())
+        };
+        if refinement == 0
+            || nodes.iter().any(|nodes| *nodes < 2)
+            || !PLANE_AXES.into_iter().zip(&values).all(fits)
+        {
+            return Err("planes do not have the size that they should have");
+        }
+        Ok(Self { refinement, nodes, values })
+    }
+}
 
 impl FeaturePlanes {
     /// Planes over `region` with all values zero.

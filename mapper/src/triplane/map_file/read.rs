@@ -94,6 +94,23 @@ impl Reader<'_> {
     }
 
     fn header(&self) -> Result<Header, FieldFileError> {
+        self.check_header()?;
+        let settings = FieldSettings {
+            geometry_cells: self.u32_at(24),
+            colour_cells: self.u32_at(28),
+            truncation: self.f32_at(32),
+            sharpness: self.f32_at(36),
+        };
+        let region = Region {
+            first: [52, 56, 60].map(|at| self.u32_at(at) as i32),
+            cells: [64, 68, 72].map(|at| self.u32_at(at)),
+        };
+        let seed = u64::from(self.u32_at(44)) | (u64::from(self.u32_at(48)) << 32);
+        Ok(Header { region, settings, seed, log_sharpness: self.f32_at(40) })
+    }
+
+    /// Checks that every number of the header is in its range.
+    fn check_header(&self) -> Result<(), FieldFileError> {
         self.check(16, "features per node", "8", |channels| channels == CHANNELS as u32)?;
         self.check(20, "units per hidden layer", "16", |units| units == HIDDEN as u32)?;
         let refinement = |cells: u32| (1..=MOST_REFINEMENT).contains(&cells);
@@ -119,18 +136,7 @@ impl Reader<'_> {
                 (1..=MOST_CELLS).contains(&cells)
             })?;
         }
-        let settings = FieldSettings {
-            geometry_cells: self.u32_at(24),
-            colour_cells: self.u32_at(28),
-            truncation: self.f32_at(32),
-            sharpness: self.f32_at(36),
-        };
-        let region = Region {
-            first: [52, 56, 60].map(|at| self.u32_at(at) as i32),
-            cells: [64, 68, 72].map(|at| self.u32_at(at)),
-        };
-        let seed = u64::from(self.u32_at(44)) | (u64::from(self.u32_at(48)) << 32);
-        Ok(Header { region, settings, seed, log_sharpness })
+        Ok(())
     }
 
     fn check(

@@ -2,6 +2,7 @@
 
 pub mod bundle;
 pub mod exposure;
+pub mod field;
 pub mod raster;
 pub mod recording;
 pub mod ssim;

@@ -38,6 +38,7 @@ pub mod synth;
 mod text_lines;
 pub mod tracking;
 pub mod trajectory_file;
+pub mod triplane;
 mod whole_file;
 
 pub use error::FileError;

@@ -23,7 +23,7 @@ pub struct LossWeights {
 }
 
 /// Differences of display values below this count quadratically, 1 is full scale: about the noise of a camera.
-const NOISE: f32 = 0.01;
+pub(crate) const NOISE: f32 = 0.01;
 
 /// Differences of inverse depth below this count quadratically, 1/metre.
 const DEPTH_NOISE: f32 = 0.004;
@@ -32,7 +32,7 @@ const DEPTH_NOISE: f32 = 0.004;
 const OPAQUE: f32 = 0.9;
 
 /// Light of stored values this bright may have been clipped; more light is no error.
-const CLIPPED: u8 = 254;
+pub(crate) const CLIPPED: u8 = 254;
 
 /// The terms of the loss of one exposure, weighted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -235,7 +235,7 @@ type DepthRow<'a> = (&'a mut [f32], &'a mut [f32], &'a [f32], &'a [f32], &'a [f3
 
 /// `sqrt(r^2 + noise^2) - noise` and its slope: absolute for large r, quadratic near zero.
 #[inline]
-fn smooth_absolute(r: f32, noise: f32) -> (f32, f32) {
+pub(crate) fn smooth_absolute(r: f32, noise: f32) -> (f32, f32) {
     let root = (r * r + noise * noise).sqrt();
     (root - noise, r / root)
 }

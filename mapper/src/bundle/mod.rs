@@ -24,6 +24,7 @@ pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, St
 pub use display::DisplayCurve;
 pub use engine::{Engine, Exposure, ExposureLoss};
 pub use frame_state::FrameState;
+pub(crate) use loss::{CLIPPED, NOISE, smooth_absolute};
 pub use loss::{LossTerms, LossWeights};
 pub use moving::WorldMoves;
 pub use observation::{Observation, ObservationPyramid, Sensor};

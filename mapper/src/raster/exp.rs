@@ -52,7 +52,7 @@ pub(super) fn exp2_of_minus<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x:
 /// `exp(x)` within 3e-7 relatively for `|x| <= 87`; arguments beyond count as 87 or -87. The result for NaN is
 /// not specified.
 #[inline(always)]
-pub(super) fn exp<S: Simd>(x: f32x8<S>) -> f32x8<S> {
+pub(crate) fn exp<S: Simd>(x: f32x8<S>) -> f32x8<S> {
     let x = x.max(-LARGEST).min(LARGEST);
     let shifted = x * LOG2_E + ROUNDING;
     let power = shifted - ROUNDING;

@@ -12,7 +12,7 @@ mod backward;
 mod bin;
 pub mod constants;
 mod driver;
-mod exp;
+pub(crate) mod exp;
 mod falloff;
 mod forward;
 mod image;

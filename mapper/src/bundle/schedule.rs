@@ -73,7 +73,7 @@ const WHOLE: Pace =
 /// From a map that has grown frame by frame to a finished one, in a fraction of the time: steps may not become short
 /// before the details are there, and paths, which are tracked, have little left to go.
 const FINISH: Pace =
-    Pace { hold: 0.2, final_length: 0.3, paths_from: 0.3, path_pixels: 0.015, density_changes: 6.0 };
+    Pace { hold: 0.2, final_length: 0.3, paths_from: 0.5, path_pixels: 0.01, density_changes: 6.0 };
 /// Position from which the density is final.
 const DENSITY_UNTIL: f64 = 0.6;
 /// Visits from which the path of a keyframe moves while the map grows.

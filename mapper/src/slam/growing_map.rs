@@ -21,13 +21,13 @@ const LEVELS: usize = 2;
 const COARSE: usize = 1;
 
 /// Work per frame, in virtual views of the coarser resolution.
-const EFFORT: f64 = 30.0;
+const EFFORT: f64 = 36.0;
 
 /// What a step costs besides its views, in views: comparing pictures and moving Gaussians.
-const STEP_COST: f64 = 2.0;
+const STEP_COST: f64 = 3.0;
 
 /// Pixels that show something new per Gaussian.
-const PIXELS_PER_GAUSSIAN: usize = 6;
+const PIXELS_PER_GAUSSIAN: usize = 9;
 
 /// Keyframes around the newest that are visited most.
 const WINDOW: usize = 8;
@@ -50,6 +50,8 @@ pub(super) struct GrowingMap {
     steps: usize,
     /// Pixels that showed something new, in pictures.
     seen: f64,
+    /// Keyframes that were given up.
+    pub(super) retired: usize,
 }
 
 impl GrowingMap {
@@ -59,7 +61,7 @@ impl GrowingMap {
         let level = SimdLevel::new();
         let bundle = BundleAdjustment::new(level, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
         let random = Pcg32::new(settings.seed, 0);
-        Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0 }
+        Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0, retired: 0 }
     }
 
     /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.
@@ -84,6 +86,7 @@ impl GrowingMap {
             && let Some(k) = most_dispensable(&self.bundle, &camera)
         {
             self.bundle.retire(k);
+            self.retired += 1;
         }
         true
     }

@@ -141,7 +141,7 @@ impl BackEnd {
 
     /// A view for the frames after that from `pose`, if the tracker should change to one.
     fn reference(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> Option<SharpView> {
-        if self.settings.reference != SlamReference::Map || !self.map.is_mature(pose) {
+        if self.settings.reference != SlamReference::Map || !self.map.is_mature() {
             return None;
         }
         self.undisputed += 1;

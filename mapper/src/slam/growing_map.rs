@@ -32,9 +32,8 @@ const PIXELS_PER_GAUSSIAN: usize = 9;
 /// Keyframes around the newest that are visited most.
 const WINDOW: usize = 8;
 
-/// A map is young until so many keyframes around the camera had so many visits each.
-const YOUNG_KEYFRAMES: usize = 3;
-const YOUNG_VISITS: u32 = 4;
+/// A map is young for so many steps.
+const YOUNG_STEPS: usize = 60;
 
 /// Steps between two changes of density.
 const DENSITY_EVERY: usize = 48;
@@ -99,12 +98,9 @@ impl GrowingMap {
         }
     }
 
-    /// Whether the map is good enough to track against: the keyframes around a pose were visited often enough.
-    pub(super) fn is_mature(&self, world_from_camera: &RigidTransform) -> bool {
-        let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
-        let visits = |near: &Neighbour| self.bundle.state.frames[near.keyframe].visits;
-        near.len() >= YOUNG_KEYFRAMES
-            && near.iter().take(YOUNG_KEYFRAMES).all(|near| visits(near) >= YOUNG_VISITS)
+    /// Whether the map has had enough steps to be worth a look.
+    pub(super) fn is_mature(&self) -> bool {
+        self.steps >= YOUNG_STEPS
     }
 
     /// The keyframe with the view nearest to a pose, other than frame `index` itself.

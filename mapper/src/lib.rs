@@ -9,7 +9,7 @@
 //! takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can go on. The
 //! result is another [`run`], with a map.
 //!
-//! [`rendering`] makes images of a map, with [`infill`] where it has nothing; [`evaluation`] and [`image_folders`] compare
+//! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
 //! results with the truth.
 
 pub mod bundle;
@@ -25,10 +25,12 @@ pub mod image_folders;
 pub mod infill;
 pub mod losses;
 pub mod mapping;
+mod ply;
 mod png;
 pub mod raster;
 pub mod rendering;
 pub mod run;
+pub mod surfaces;
 pub mod synth;
 mod text_lines;
 pub mod tracking;

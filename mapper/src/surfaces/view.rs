@@ -1,0 +1,186 @@
+//! What a camera sees of a surface, and how far it can be trusted.
+
+use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use rayon::prelude::*;
+
+/// Below this cosine between a surface and the direction to the camera, about 81 degrees, depth is not used: there is
+/// either an edge between near and far, or a surface seen so flat that a pixel's depth says little.
+const MIN_COSINE: f32 = 0.15;
+
+/// Surfaces nearer than this, metres, weigh no more than one at this distance.
+const NEAREST: f32 = 0.5;
+
+/// Depth and colour of a scene from one pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthView {
+    /// Intrinsics; its size is that of the images.
+    pub camera: PinholeCamera,
+    /// Pose of the camera.
+    pub world_from_camera: RigidTransform,
+    /// Depth along the optical axis in metres, row by row; 0 where there is none.
+    pub depth: Vec<f32>,
+    /// Red, green and blue in linear light, row by row.
+    pub colour: Vec<[f32; 3]>,
+}
+
+/// Views that can be had one after the other, and again: none has to stay in memory.
+pub trait ViewSource {
+    /// Number of views.
+    fn count(&self) -> usize;
+
+    /// A view by its index, which is below [`Self::count`]; the same every time, whatever the number of threads.
+    fn view(&mut self, index: usize) -> DepthView;
+}
+
+/// The surface at a pixel, as a plane.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PixelSurface {
+    /// Depth along the optical axis, metres.
+    pub(super) depth: f32,
+    /// Distance from the plane per depth in front of it: the cosine between normal and ray, times the length of the ray
+    /// per depth.
+    pub(super) slope: f32,
+    /// Cosine between normal and ray; 0 where there is nothing.
+    pub(super) cosine: f32,
+}
+
+/// A view prepared to be asked for the surface at any image point.
+#[derive(Debug)]
+pub(super) struct SurfaceView {
+    pub(super) camera: PinholeCamera,
+    pub(super) camera_from_world: RigidTransform,
+    pub(super) pixels: Vec<PixelSurface>,
+}
+
+impl SurfaceView {
+    pub(super) fn new(view: &DepthView) -> Self {
+        let camera = view.camera;
+        let pixels = camera.width * camera.height;
+        // A source that keeps to its contract gives as many depths as pixels; missing ones are none.
+        let mut surface = vec![PixelSurface::default(); pixels];
+        if view.depth.len() == pixels {
+            let rows = surface.par_chunks_mut(camera.width.max(1)).enumerate();
+            rows.for_each(|(v, row)| {
+                for (u, pixel) in row.iter_mut().enumerate() {
+                    *pixel = surface_at(view, u, v).unwrap_or_default();
+                }
+            });
+        }
+        Self { camera, camera_from_world: view.world_from_camera.inverse(), pixels: surface }
+    }
+
+    /// The surface at an image point: between four pixels where all of them have one, else that of the nearest.
+    pub(super) fn at(&self, u: f32, v: f32) -> Option<PixelSurface> {
+        let (width, height) = (self.camera.width, self.camera.height);
+        let inside = u > -0.5 && v > -0.5 && u < width as f32 - 0.5 && v < height as f32 - 0.5;
+        if !inside {
+            return None;
+        }
+        let (left, top) = (u.max(0.0) as usize, v.max(0.0) as usize);
+        if left + 1 < width && top + 1 < height {
+            let first = top * width + left;
+            let [a, b, c, d] = [first, first + 1, first + width, first + width + 1].map(|k| self.pixels[k]);
+            if a.cosine > 0.0 && b.cosine > 0.0 && c.cosine > 0.0 && d.cosine > 0.0 {
+                let (x, y) = (u - left as f32, v - top as f32);
+                return Some(a.mixed(&b, x).mixed(&c.mixed(&d, x), y));
+            }
+        }
+        let nearest = self.pixels[(v + 0.5) as usize * width + (u + 0.5) as usize];
+        (nearest.cosine > 0.0).then_some(nearest)
+    }
+}
+
+impl PixelSurface {
+    /// Weight of what the pixel says about a point at some depth, metres: pixels are small when near.
+    pub(super) fn weight(&self, depth: f32) -> f32 {
+        self.cosine / depth.max(NEAREST).powi(2)
+    }
+
+    fn mixed(&self, other: &Self, share: f32) -> Self {
+        let mix = |a: f32, b: f32| a + share * (b - a);
+        Self {
+            depth: mix(self.depth, other.depth),
+            slope: mix(self.slope, other.slope),
+            cosine: mix(self.cosine, other.cosine),
+        }
+    }
+}
+
+/// The plane through a pixel and its four neighbours. In normalised image coordinates x, y the inverse depth of a plane
+/// `a X + b Y + c Z = 1` is `a x + b y + c`.
+fn surface_at(view: &DepthView, u: usize, v: usize) -> Option<PixelSurface> {
+    let PinholeCamera { width, height, fx, fy, cx, cy } = view.camera;
+    if u == 0 || v == 0 || u + 1 >= width || v + 1 >= height {
+        return None;
+    }
+    let inverse_depth = |u: usize, v: usize| {
+        let depth = view.depth[v * width + u];
+        (depth > 0.0 && depth.is_finite()).then(|| 1.0 / depth)
+    };
+    let centre = inverse_depth(u, v)?;
+    let a = (inverse_depth(u + 1, v)? - inverse_depth(u - 1, v)?) * 0.5 * fx as f32;
+    let b = (inverse_depth(u, v + 1)? - inverse_depth(u, v - 1)?) * 0.5 * fy as f32;
+    let (x, y) = ((u as f64 - cx) / fx, (v as f64 - cy) / fy);
+    let (x, y) = (x as f32, y as f32);
+    let c = centre - a * x - b * y;
+    let slope = centre / (a * a + b * b + c * c).sqrt();
+    let cosine = slope / (x * x + y * y + 1.0).sqrt();
+    (cosine > MIN_COSINE).then_some(PixelSurface { depth: 1.0 / centre, slope, cosine })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plane through (0, 0, 2) whose normal leans by `lean` to the side, seen from the origin.
+    fn leaning(lean: f32) -> SurfaceView {
+        let camera = PinholeCamera { width: 41, height: 31, fx: 100.0, fy: 90.0, cx: 20.0, cy: 15.0 };
+        let depth = |pixel: usize| {
+            let x = ((pixel % 41) as f32 - 20.0) / 100.0;
+            2.0 * lean.cos() / (lean.cos() + lean.sin() * x)
+        };
+        SurfaceView::new(&DepthView {
+            camera,
+            world_from_camera: RigidTransform::identity(),
+            depth: (0..41 * 31).map(depth).collect(),
+            colour: Vec::new(),
+        })
+    }
+
+    #[test]
+    fn a_plane_has_its_slope_and_weight_everywhere() {
+        for lean in [0.0, 0.5, -1.0_f32] {
+            let view = leaning(lean);
+            let centre = view.at(20.0, 15.0).unwrap();
+            assert!(
+                (centre.depth - 2.0).abs() < 1e-5 && (centre.slope - lean.cos()).abs() < 1e-3,
+                "{centre:?}"
+            );
+            assert!((centre.weight(2.0) - lean.cos() / 4.0).abs() < 1e-3);
+            // The point a metre in front of the surface on a slanted ray: its distance from the plane.
+            let aside = view.at(35.5, 4.25).unwrap();
+            let (x, z) = ((aside.depth - 1.0) * 0.155, aside.depth - 1.0);
+            let distance = (lean.cos() * (2.0 - z) - lean.sin() * x).abs();
+            assert!((aside.slope - distance).abs() < 2e-3, "{} instead of {distance}", aside.slope);
+        }
+    }
+
+    #[test]
+    fn edges_and_borders_are_not_trusted() {
+        let mut view = DepthView {
+            camera: PinholeCamera { width: 9, height: 5, fx: 100.0, fy: 100.0, cx: 4.0, cy: 2.0 },
+            world_from_camera: RigidTransform::identity(),
+            depth: (0..45).map(|k| if k % 9 < 5 { 1.0 } else { 2.0 }).collect(),
+            colour: Vec::new(),
+        };
+        let row = |view: &DepthView| -> Vec<bool> {
+            SurfaceView::new(view).pixels[18..27].iter().map(|pixel| pixel.cosine > 0.0).collect()
+        };
+        assert_eq!(row(&view), [false, true, true, true, false, false, true, true, false]);
+        view.depth[11] = 0.0;
+        assert_eq!(row(&view)[..4], [false, true, false, true]);
+        view.depth.pop();
+        assert_eq!(row(&view), [false; 9]);
+        assert_eq!(leaning(1.5).at(20.0, 15.0), None, "4 degrees are too flat");
+    }
+}

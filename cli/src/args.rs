@@ -1,6 +1,7 @@
 //! The command line.
 
 pub mod map;
+pub mod surface;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -57,6 +58,8 @@ pub enum Command {
     Map(map::Map),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
+    /// Write the surface of the map of a RUN folder as a coloured mesh
+    Mesh(surface::Mesh),
     /// Write report.html and charts into a RUN folder
     Report(Report),
     /// Measure an estimate against a reference
@@ -354,6 +357,8 @@ pub enum EvalCommand {
     Trajectory(EvalTrajectory),
     /// PSNR and SSIM of images, and differences of depth maps, against true ones of the same name
     Images(EvalImages),
+    /// Precision, recall and F1 of a surface against a true one
+    Mesh(surface::EvalMesh),
 }
 
 /// Arguments of `mba eval trajectory`.

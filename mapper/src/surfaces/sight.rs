@@ -11,6 +11,12 @@ use crate::deblurring::ForwardResponse;
 /// Weight of a colour where the view has no depth to be trusted: it counts where there is no other.
 const DOUBTFUL: f32 = 1e-6;
 
+/// How far colours reach beyond what has one, in triangles.
+const LENDING_STEPS: usize = 4;
+
+/// Where there is no colour.
+const GREY: [u8; 3] = [128; 3];
+
 /// What views have shown of each vertex so far.
 #[derive(Clone, Debug)]
 pub struct Sight {
@@ -48,7 +54,7 @@ impl Sight {
     }
 
     /// The mesh without triangles of which no corner was seen and without small parts. Colours are means over the
-    /// views, weighted by trust in their depth, as sRGB; those of vertices without any come from the triangle, or else
+    /// views, weighted by trust in their depth, as sRGB; those of vertices without any come from nearby, or else
     /// stay as they were.
     #[must_use]
     pub fn trim(&self, mesh: &Mesh, trim: &Trim) -> Mesh {
@@ -63,25 +69,25 @@ impl Sight {
     }
 
     fn colours(&self, mesh: &Mesh) -> Vec<[u8; 3]> {
-        const GREY: [u8; 3] = [128; 3];
         let response = ForwardResponse::new(&InverseResponse::srgb());
         let own = |vertex: &Vertex| {
             let [red, green, blue, weight] = vertex.colour;
             (weight > 0.0).then(|| [red, green, blue].map(|sum| response.encode(sum / weight)))
         };
-        let own: Vec<Option<[u8; 3]>> = self.vertices.iter().map(own).collect();
-        let earlier = |k: usize| mesh.colours.get(k).copied().unwrap_or(GREY);
-        let mut colours: Vec<[u8; 3]> =
-            own.iter().enumerate().map(|(k, own)| own.unwrap_or_else(|| earlier(k))).collect();
-        for corners in &mesh.triangles {
-            let lent = corners.iter().find_map(|corner| own[*corner as usize]);
-            for corner in corners.map(|corner| corner as usize) {
-                if let (None, Some(lent)) = (own[corner], lent) {
-                    colours[corner] = lent;
-                }
-            }
+        let mut colours: Vec<Option<[u8; 3]>> = self.vertices.iter().map(own).collect();
+        for _ in 0..LENDING_STEPS {
+            lend(&mesh.triangles, &mut colours);
         }
-        colours
+        let earlier = |k: usize| mesh.colours.get(k).copied().unwrap_or(GREY);
+        colours.iter().enumerate().map(|(k, own)| own.unwrap_or_else(|| earlier(k))).collect()
+    }
+}
+
+/// Gives vertices without a colour that of another corner of a triangle.
+fn lend(triangles: &[[u32; 3]], colours: &mut [Option<[u8; 3]>]) {
+    for corners in triangles {
+        let lent = corners.iter().find_map(|corner| colours[*corner as usize]);
+        corners.iter().for_each(|corner| colours[*corner as usize] = colours[*corner as usize].or(lent));
     }
 }
 

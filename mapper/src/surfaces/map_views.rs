@@ -8,7 +8,7 @@ use crate::gaussians::Gaussians;
 use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
 
 /// Depth is used where the map hides at least this share of what is behind it.
-const OPAQUE: f32 = 0.9;
+const OPAQUE: f32 = 0.5;
 
 /// Views of a map from given poses, rendered whenever they are asked for.
 #[derive(Debug)]

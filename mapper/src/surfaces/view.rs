@@ -3,9 +3,19 @@
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use rayon::prelude::*;
 
-/// Below this cosine between a surface and the direction to the camera, about 81 degrees, depth is not used: there is
-/// either an edge between near and far, or a surface seen so flat that a pixel's depth says little.
-const MIN_COSINE: f32 = 0.15;
+/// Below this cosine between a surface and the direction to the camera, about 84 degrees, depth is not used: a surface
+/// is seen so flat that a pixel's depth says little.
+const MIN_COSINE: f32 = 0.1;
+
+/// Places in the window of a plane, in pixels from its middle.
+const OFFSETS: [isize; 5] = [-4, -2, 0, 2, 4];
+
+/// Pixels whose inverse depth differs by at most this share belong to one surface.
+const SAME_SURFACE: f32 = 0.02;
+
+/// Share of the window that has to belong to the surface: less means an edge between near and far, where mean depths
+/// belong to neither.
+const LEAST_SHARE: f32 = 0.4;
 
 /// Surfaces nearer than this, metres, weigh no more than one at this distance.
 const NEAREST: f32 = 0.5;
@@ -59,10 +69,12 @@ impl SurfaceView {
         // A source that keeps to its contract gives as many depths as pixels; missing ones are none.
         let mut surface = vec![PixelSurface::default(); pixels];
         if view.depth.len() == pixels {
+            let inverse = |depth: &f32| if *depth > 0.0 && depth.is_finite() { 1.0 / depth } else { 0.0 };
+            let inverse_depth: Vec<f32> = view.depth.iter().map(inverse).collect();
             let rows = surface.par_chunks_mut(camera.width.max(1)).enumerate();
             rows.for_each(|(v, row)| {
                 for (u, pixel) in row.iter_mut().enumerate() {
-                    *pixel = surface_at(view, u, v).unwrap_or_default();
+                    *pixel = surface_at(view, &inverse_depth, u, v).unwrap_or_default();
                 }
             });
         }
@@ -106,26 +118,80 @@ impl PixelSurface {
     }
 }
 
-/// The plane through a pixel and its four neighbours. In normalised image coordinates x, y the inverse depth of a plane
-/// `a X + b Y + c Z = 1` is `a x + b y + c`.
-fn surface_at(view: &DepthView, u: usize, v: usize) -> Option<PixelSurface> {
+/// The plane that fits best around a pixel. In normalised image coordinates x, y the inverse depth of a plane
+/// `a X + b Y + c Z = 1` is `a x + b y + c`: a linear least-squares problem over those pixels of the window that
+/// belong to the same surface. This also evens out the bumps that single Gaussians make.
+fn surface_at(view: &DepthView, inverse_depth: &[f32], u: usize, v: usize) -> Option<PixelSurface> {
     let PinholeCamera { width, height, fx, fy, cx, cy } = view.camera;
-    if u == 0 || v == 0 || u + 1 >= width || v + 1 >= height {
+    let centre = inverse_depth[v * width + u];
+    if centre <= 0.0 {
         return None;
     }
-    let inverse_depth = |u: usize, v: usize| {
-        let depth = view.depth[v * width + u];
-        (depth > 0.0 && depth.is_finite()).then(|| 1.0 / depth)
-    };
-    let centre = inverse_depth(u, v)?;
-    let a = (inverse_depth(u + 1, v)? - inverse_depth(u - 1, v)?) * 0.5 * fx as f32;
-    let b = (inverse_depth(u, v + 1)? - inverse_depth(u, v - 1)?) * 0.5 * fy as f32;
-    let (x, y) = ((u as f64 - cx) / fx, (v as f64 - cy) / fy);
-    let (x, y) = (x as f32, y as f32);
-    let c = centre - a * x - b * y;
-    let slope = centre / (a * a + b * b + c * c).sqrt();
+    let mut fit = PlaneFit::default();
+    let mut within = 0;
+    for dy in OFFSETS {
+        let Some(row) = v.checked_add_signed(dy).filter(|row| *row < height) else { continue };
+        for dx in OFFSETS {
+            let Some(column) = u.checked_add_signed(dx).filter(|column| *column < width) else { continue };
+            within += 1;
+            let difference = inverse_depth[row * width + column] - centre;
+            if difference.abs() <= SAME_SURFACE * centre {
+                fit.add(dx as f32, dy as f32, difference);
+            }
+        }
+    }
+    if fit.count < LEAST_SHARE * within as f32 {
+        return None;
+    }
+    let [a, b, difference] = fit.solve()?;
+    let (a, b, inverse) = (a * fx as f32, b * fy as f32, centre + difference);
+    let (x, y) = (((u as f64 - cx) / fx) as f32, ((v as f64 - cy) / fy) as f32);
+    let c = inverse - a * x - b * y;
+    let slope = inverse / (a * a + b * b + c * c).sqrt();
     let cosine = slope / (x * x + y * y + 1.0).sqrt();
-    (cosine > MIN_COSINE).then_some(PixelSurface { depth: 1.0 / centre, slope, cosine })
+    (cosine > MIN_COSINE).then_some(PixelSurface { depth: 1.0 / inverse, slope, cosine })
+}
+
+/// Sums for a fit of `d = a x + b y + c`.
+#[derive(Clone, Copy, Debug, Default)]
+struct PlaneFit {
+    count: f32,
+    x: f32,
+    y: f32,
+    xx: f32,
+    xy: f32,
+    yy: f32,
+    d: f32,
+    xd: f32,
+    yd: f32,
+}
+
+impl PlaneFit {
+    fn add(&mut self, x: f32, y: f32, d: f32) {
+        self.count += 1.0;
+        self.x += x;
+        self.y += y;
+        self.xx += x * x;
+        self.xy += x * y;
+        self.yy += y * y;
+        self.d += d;
+        self.xd += x * d;
+        self.yd += y * d;
+    }
+
+    /// a, b and c; `None` when all points are on a line.
+    fn solve(&self) -> Option<[f32; 3]> {
+        let [x, y, d] = [self.x, self.y, self.d].map(|sum| sum / self.count);
+        let (xx, xy, yy) = (self.xx - self.x * x, self.xy - self.x * y, self.yy - self.y * y);
+        let (xd, yd) = (self.xd - self.x * d, self.yd - self.y * d);
+        let determinant = xx * yy - xy * xy;
+        if determinant < 0.5 {
+            return None;
+        }
+        let a = (yy * xd - xy * yd) / determinant;
+        let b = (xx * yd - xy * xd) / determinant;
+        Some([a, b, d - a * x - b * y])
+    }
 }
 
 #[cfg(test)]

@@ -70,6 +70,9 @@ pub fn evaluate_surface(
     thresholds_cm: &[f64],
 ) -> Result<SurfaceFigures, SurfaceComparisonError> {
     for (name, points) in [("reference", reference), ("estimated", estimate)] {
+        if points.is_empty() {
+            return Err(SurfaceComparisonError::Empty(name));
+        }
         if points.iter().flatten().any(|coordinate| !coordinate.is_finite()) {
             return Err(SurfaceComparisonError::NotFinite(name));
         }

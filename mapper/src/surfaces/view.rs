@@ -1,19 +1,20 @@
 //! What a camera sees of a surface, and how far it can be trusted.
 
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// Below this cosine between a surface and the direction to the camera, about 84 degrees, depth is not used: a surface
+/// Below this cosine between a surface and the direction to the camera, about 81 degrees, depth is not used: a surface
 /// is seen so flat that a pixel's depth says little.
-const MIN_COSINE: f32 = 0.1;
+const MIN_COSINE: f32 = 0.15;
 
 /// Places in the window of a plane, in pixels from its middle.
 const OFFSETS: [isize; 5] = [-4, -2, 0, 2, 4];
 
-/// Pixels whose inverse depth differs by at most this share belong to one surface.
-const SAME_SURFACE: f32 = 0.02;
+/// Pixels whose inverse depth is off the slope at the middle by at most this share belong to the same surface.
+const SAME_SURFACE: f32 = 0.015;
 
-/// Share of the window that has to belong to the surface: less means an edge between near and far, where mean depths
+/// Share of the depths in the window that has to belong to the surface: less means an edge between near and far, where mean depths
 /// belong to neither.
 const LEAST_SHARE: f32 = 0.4;
 
@@ -47,9 +48,10 @@ pub trait ViewSource {
 pub(super) struct PixelSurface {
     /// Depth along the optical axis, metres.
     pub(super) depth: f32,
-    /// Distance from the plane per depth in front of it: the cosine between normal and ray, times the length of the ray
-    /// per depth.
-    pub(super) slope: f32,
+    /// Unit normal in the camera's frame, away from the camera.
+    normal: Vector3<f32>,
+    /// Distance of the plane from the camera, metres.
+    offset: f32,
     /// Cosine between normal and ray; 0 where there is nothing.
     pub(super) cosine: f32,
 }
@@ -81,23 +83,14 @@ impl SurfaceView {
         Self { camera, camera_from_world: view.world_from_camera.inverse(), pixels: surface }
     }
 
-    /// The surface at an image point: between four pixels where all of them have one, else that of the nearest.
-    pub(super) fn at(&self, u: f32, v: f32) -> Option<PixelSurface> {
+    /// The surface at the pixel nearest to an image point.
+    pub(super) fn at(&self, u: f32, v: f32) -> Option<&PixelSurface> {
         let (width, height) = (self.camera.width, self.camera.height);
         let inside = u > -0.5 && v > -0.5 && u < width as f32 - 0.5 && v < height as f32 - 0.5;
         if !inside {
             return None;
         }
-        let (left, top) = (u.max(0.0) as usize, v.max(0.0) as usize);
-        if left + 1 < width && top + 1 < height {
-            let first = top * width + left;
-            let [a, b, c, d] = [first, first + 1, first + width, first + width + 1].map(|k| self.pixels[k]);
-            if a.cosine > 0.0 && b.cosine > 0.0 && c.cosine > 0.0 && d.cosine > 0.0 {
-                let (x, y) = (u - left as f32, v - top as f32);
-                return Some(a.mixed(&b, x).mixed(&c.mixed(&d, x), y));
-            }
-        }
-        let nearest = self.pixels[(v + 0.5) as usize * width + (u + 0.5) as usize];
+        let nearest = self.pixels.get((v + 0.5) as usize * width + (u + 0.5) as usize)?;
         (nearest.cosine > 0.0).then_some(nearest)
     }
 }
@@ -108,13 +101,10 @@ impl PixelSurface {
         self.cosine / depth.max(NEAREST).powi(2)
     }
 
-    fn mixed(&self, other: &Self, share: f32) -> Self {
-        let mix = |a: f32, b: f32| a + share * (b - a);
-        Self {
-            depth: mix(self.depth, other.depth),
-            slope: mix(self.slope, other.slope),
-            cosine: mix(self.cosine, other.cosine),
-        }
+    /// Distance of a point of the camera's frame from the plane, metres; positive in front of it. Between pixels the
+    /// planes of both agree, unless there is an edge.
+    pub(super) fn distance(&self, point: &Vector3<f32>) -> f32 {
+        self.offset - self.normal.dot(point)
     }
 }
 
@@ -127,17 +117,21 @@ fn surface_at(view: &DepthView, inverse_depth: &[f32], u: usize, v: usize) -> Op
     if centre <= 0.0 {
         return None;
     }
+    let beside = |dx: isize, dy: isize| {
+        let [u, v] = [u.checked_add_signed(dx)?, v.checked_add_signed(dy)?];
+        let inverse = if u < width && v < height { inverse_depth[v * width + u] } else { 0.0 };
+        (inverse > 0.0).then_some(inverse - centre)
+    };
+    let along_x = gradient([beside(-2, 0), beside(2, 0)]);
+    let along_y = gradient([beside(0, -2), beside(0, 2)]);
     let mut fit = PlaneFit::default();
     let mut within = 0;
-    for dy in OFFSETS {
-        let Some(row) = v.checked_add_signed(dy).filter(|row| *row < height) else { continue };
-        for dx in OFFSETS {
-            let Some(column) = u.checked_add_signed(dx).filter(|column| *column < width) else { continue };
-            within += 1;
-            let difference = inverse_depth[row * width + column] - centre;
-            if difference.abs() <= SAME_SURFACE * centre {
-                fit.add(dx as f32, dy as f32, difference);
-            }
+    for [dx, dy] in OFFSETS.into_iter().flat_map(|dy| OFFSETS.map(|dx| [dx, dy])) {
+        let Some(difference) = beside(dx, dy) else { continue };
+        within += 1;
+        let (x, y) = (dx as f32, dy as f32);
+        if (difference - along_x * x - along_y * y).abs() <= SAME_SURFACE * centre {
+            fit.add(x, y, difference);
         }
     }
     if fit.count < LEAST_SHARE * within as f32 {
@@ -147,9 +141,18 @@ fn surface_at(view: &DepthView, inverse_depth: &[f32], u: usize, v: usize) -> Op
     let (a, b, inverse) = (a * fx as f32, b * fy as f32, centre + difference);
     let (x, y) = (((u as f64 - cx) / fx) as f32, ((v as f64 - cy) / fy) as f32);
     let c = inverse - a * x - b * y;
-    let slope = inverse / (a * a + b * b + c * c).sqrt();
-    let cosine = slope / (x * x + y * y + 1.0).sqrt();
-    (cosine > MIN_COSINE).then_some(PixelSurface { depth: 1.0 / inverse, slope, cosine })
+    let plane = Vector3::new(a, b, c);
+    let offset = 1.0 / plane.norm();
+    let cosine = inverse * offset / (x * x + y * y + 1.0).sqrt();
+    let surface = PixelSurface { depth: 1.0 / inverse, normal: plane * offset, offset, cosine };
+    (cosine > MIN_COSINE).then_some(surface)
+}
+
+/// Change per pixel by the differences to what is two pixels before and behind: the smaller one, which does not reach
+/// across an edge.
+fn gradient([before, behind]: [Option<f32>; 2]) -> f32 {
+    let slopes = [before.map(|difference| -0.5 * difference), behind.map(|difference| 0.5 * difference)];
+    slopes.into_iter().flatten().min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }
 
 /// Sums for a fit of `d = a x + b y + c`.
@@ -214,37 +217,38 @@ mod tests {
     }
 
     #[test]
-    fn a_plane_has_its_slope_and_weight_everywhere() {
+    fn a_plane_has_its_distance_and_weight_everywhere() {
         for lean in [0.0, 0.5, -1.0_f32] {
             let view = leaning(lean);
             let centre = view.at(20.0, 15.0).unwrap();
             assert!(
-                (centre.depth - 2.0).abs() < 1e-5 && (centre.slope - lean.cos()).abs() < 1e-3,
-                "{centre:?}"
+                (centre.depth - 2.0).abs() < 1e-4 && (centre.weight(2.0) - lean.cos() / 4.0).abs() < 1e-3
             );
-            assert!((centre.weight(2.0) - lean.cos() / 4.0).abs() < 1e-3);
-            // The point a metre in front of the surface on a slanted ray: its distance from the plane.
-            let aside = view.at(35.5, 4.25).unwrap();
-            let (x, z) = ((aside.depth - 1.0) * 0.155, aside.depth - 1.0);
-            let distance = (lean.cos() * (2.0 - z) - lean.sin() * x).abs();
-            assert!((aside.slope - distance).abs() < 2e-3, "{} instead of {distance}", aside.slope);
+            let point = Vector3::new(0.155, -0.12, 1.0);
+            let distance = lean.cos() * (2.0 - point.z) - lean.sin() * point.x;
+            let found = view.at(35.5, 4.2).unwrap().distance(&point);
+            assert!((found - distance).abs() < 1e-3, "{found} instead of {distance}");
         }
     }
 
     #[test]
-    fn edges_and_borders_are_not_trusted() {
+    fn mixed_depth_at_edges_is_not_trusted() {
+        // Near on the left, far on the right, and a column in between that belongs to neither.
+        let depth = |k: usize| [1.0, 1.5, 2.0][(k % 9 + 1) / 5 + (k % 9) / 5];
         let mut view = DepthView {
             camera: PinholeCamera { width: 9, height: 5, fx: 100.0, fy: 100.0, cx: 4.0, cy: 2.0 },
             world_from_camera: RigidTransform::identity(),
-            depth: (0..45).map(|k| if k % 9 < 5 { 1.0 } else { 2.0 }).collect(),
+            depth: (0..45).map(depth).collect(),
             colour: Vec::new(),
         };
         let row = |view: &DepthView| -> Vec<bool> {
             SurfaceView::new(view).pixels[18..27].iter().map(|pixel| pixel.cosine > 0.0).collect()
         };
-        assert_eq!(row(&view), [false, true, true, true, false, false, true, true, false]);
-        view.depth[11] = 0.0;
-        assert_eq!(row(&view)[..4], [false, true, false, true]);
+        assert_eq!(row(&view), [true, true, true, true, false, true, true, true, true]);
+        let near = SurfaceView::new(&view).pixels[18 + 3];
+        assert_eq!((near.depth, near.offset), (1.0, 1.0), "what is behind the edge has no influence");
+        view.depth[20] = 0.0;
+        assert_eq!(row(&view)[..4], [true, true, false, true]);
         view.depth.pop();
         assert_eq!(row(&view), [false; 9]);
         assert_eq!(leaning(1.5).at(20.0, 15.0), None, "4 degrees are too flat");

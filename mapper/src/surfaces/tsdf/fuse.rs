@@ -10,6 +10,10 @@ use crate::surfaces::view::{DepthView, SurfaceView};
 /// Voxels nearer to the camera than this, metres, are left alone.
 const NEAREST: f32 = 0.05;
 
+/// Along a ray the plane of a pixel counts this many truncation distances before its depth, and one behind it: a plane
+/// that is seen flat goes on for long, the surface may not, and behind the edge of a surface there may be nothing.
+const REACH: f32 = 2.0;
+
 /// A view, and what tells quickly that a block is out of sight.
 struct Fusion<'a> {
     view: &'a SurfaceView,
@@ -84,7 +88,7 @@ impl<'a> Fusion<'a> {
     fn is_out_of_sight(&self, middle: &Vector3<f32>) -> bool {
         let radius = 0.5 * 3_f32.sqrt() * EDGE as f32 * self.voxel;
         middle.z + radius < NEAREST
-            || middle.z - radius > self.deepest + self.truncation / super::FLATTEST
+            || middle.z - radius > self.deepest + self.truncation
             || self.sides.iter().any(|side| side.dot(middle) < -radius)
     }
 
@@ -95,7 +99,12 @@ impl<'a> Fusion<'a> {
         }
         let [u, v] = [0, 1].map(|k| self.focal[k] * point[k] / point.z + self.centre[k]);
         let surface = self.view.at(u, v)?;
-        let distance = (surface.depth - point.z) * surface.slope;
+        let ahead = surface.depth - point.z;
+        if ahead < -self.truncation {
+            return None;
+        }
+        let clear = ahead > REACH * self.truncation;
+        let distance = if clear { self.truncation } else { surface.distance(point) };
         (distance >= -self.truncation).then(|| [distance.min(self.truncation), surface.weight(point.z)])
     }
 }

@@ -15,9 +15,6 @@ use rayon::prelude::*;
 use super::marching::{Assembly, Lattice, Piece, SampleBox};
 use super::{Mesh, SurfaceError, ViewSource};
 
-/// Least distance from a plane per depth behind it.
-const FLATTEST: f32 = 0.1;
-
 /// How views are fused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FusionSettings {

@@ -26,7 +26,7 @@ pub(super) struct Edge {
 /// Triangles of the surface for each set of corners that are inside (negative), as bits by the number of the corner;
 /// normals point outside.
 pub(super) static TRIANGLES: LazyLock<[Vec<[Edge; 3]>; 256]> =
-    LazyLock::new(|| std::array::from_fn(|inside| triangles_of(inside)));
+    LazyLock::new(|| std::array::from_fn(triangles_of));
 
 fn triangles_of(inside: usize) -> Vec<[Edge; 3]> {
     let mut segments: Vec<[Edge; 2]> = faces().iter().flat_map(|face| segments_of(inside, face)).collect();

@@ -59,6 +59,8 @@ pub enum Command {
     Map(map::Map),
     /// Track and map a data set at the same time
     Slam(slam::Slam),
+    /// Run slam with each part left out in turn and print what it is worth
+    Ablate(slam::Ablate),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
     /// Write the surface of the map of a RUN folder as a coloured mesh

@@ -55,6 +55,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Track(args) => commands::track::run(args, console),
         Command::Map(args) => commands::map::run(args, console),
         Command::Slam(args) => commands::slam::run(args, console),
+        Command::Ablate(args) => commands::ablate::run(args, console),
         Command::Render(args) => commands::render::run(args, console),
         Command::Mesh(args) => commands::mesh::run(args, console),
         Command::Report(args) => commands::report::run(args, console),

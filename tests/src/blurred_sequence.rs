@@ -6,6 +6,7 @@ use mba_mapper::dataset::{self, Dataset};
 use mba_mapper::evaluation::{blur_length, motion_of};
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, Summary};
+use mba_mapper::slam::{SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
 use mba_mapper::tracking::{TrackingOptions, track_dataset};
 use mba_mapper::trajectory_file::TimedExposure;
@@ -84,6 +85,22 @@ impl BlurredSequence {
     pub fn map(&self, run: &Run, name: &str, settings: &MapSettings) -> Summary {
         let out = self.path(name);
         map_dataset(&self.dataset, run, settings, &out, false, self.describe(), |_| ()).expect("a map")
+    }
+
+    /// Tracks and maps the sequence into the folder `name`.
+    ///
+    /// # Panics
+    /// When that fails.
+    pub fn slam(&self, name: &str, settings: &SlamSettings) -> Summary {
+        self.slam_of(&self.dataset, name, settings)
+    }
+
+    /// Tracks and maps a data set made from this one into the folder `name`.
+    ///
+    /// # Panics
+    /// When that fails.
+    pub fn slam_of(&self, dataset: &Dataset, name: &str, settings: &SlamSettings) -> Summary {
+        run_slam(dataset, settings, &self.path(name), self.describe(), |_| ()).expect("a finished run")
     }
 
     fn describe(&self) -> RunSettings {

@@ -1,5 +1,6 @@
 //! One file per command.
 
+pub mod ablate;
 pub mod alignment;
 pub mod demo;
 pub mod eval_images;

@@ -1,11 +1,11 @@
 //! `report.html`: one file without network access.
 
 use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
-use mba_mapper::run::{MapFigures, Run, Spread, Summary};
+use mba_mapper::run::{MapFigures, Run, SlamFigures, Spread, Summary};
 use serde_json::Value;
 
 use super::plots::Plot;
-use super::table::{map_rows, percent};
+use super::table::{map_rows, percent, slam_rows};
 
 const STYLE: &str = include_str!("style.css");
 
@@ -22,6 +22,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
         summary.trajectory.as_ref().map(trajectory_table).unwrap_or_default(),
         summary.blur.as_ref().map(blur_table).unwrap_or_default(),
         summary.map.as_ref().map(map_table).unwrap_or_default(),
+        summary.slam.as_ref().map(slam_table).unwrap_or_default(),
         settings_table(summary),
     ];
     format!(
@@ -163,9 +164,17 @@ fn blur_table(figures: &BlurFigures) -> String {
 }
 
 fn map_table(figures: &MapFigures) -> String {
+    labelled_card("Map", map_rows(figures))
+}
+
+fn slam_table(figures: &SlamFigures) -> String {
+    labelled_card("Tracking and mapping", slam_rows(figures))
+}
+
+fn labelled_card(title: &str, rows: Vec<(&'static str, String)>) -> String {
     let rows: Vec<[String; 2]> =
-        map_rows(figures).into_iter().map(|(label, value)| [label.to_owned(), value]).collect();
-    card("Map", &rows)
+        rows.into_iter().map(|(label, value)| [label.trim().to_owned(), value]).collect();
+    card(title, &rows)
 }
 
 fn settings_table(summary: &Summary) -> String {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
-use mba_mapper::run::{MapFigures, Spread, Summary};
+use mba_mapper::run::{MapFigures, SlamFigures, Spread, Summary};
 
 /// The table of a trajectory evaluation, lengths in metres, angles in degrees.
 #[must_use]
@@ -29,6 +29,7 @@ pub fn trajectory(figures: &TrajectoryFigures) -> String {
         ("of the estimate", percent(figures.estimate_coverage)),
         ("of the reference", percent(figures.reference_coverage)),
         ("within 2 cm", percent(figures.share_within_2cm)),
+        ("drift at the end", format!("{:.6} m, {:.4} deg", figures.end_drift_m, figures.end_drift_deg)),
     ];
     text + &pairs(&rows) + &scale_row(figures.scale)
 }
@@ -52,6 +53,7 @@ pub fn summary(summary: &Summary) -> String {
         summary.trajectory.as_ref().map(trajectory),
         summary.blur.as_ref().map(blur),
         summary.map.as_ref().map(map),
+        summary.slam.as_ref().map(|figures| pairs(&slam_rows(figures))),
     ];
     for part in parts {
         text.extend(part.map(|part| "\n".to_owned() + &part));
@@ -106,6 +108,23 @@ pub fn map_rows(figures: &MapFigures) -> Vec<(&'static str, String)> {
         rows.extend((!text.is_empty()).then_some((label, text)));
     }
     rows.extend(mapped.map(|mapped| ("  where there is a map", where_mapped(mapped))));
+    rows
+}
+
+/// Label and value of how tracking and mapping at the same time went.
+#[must_use]
+pub fn slam_rows(figures: &SlamFigures) -> Vec<(&'static str, String)> {
+    let mut rows = vec![
+        ("frames per second", format!("{:.2} with the refinement", figures.frames_per_second)),
+        ("  until the last frame", format!("{:.2}", figures.live_frames_per_second)),
+        ("frames on the map", figures.frames_on_map.to_string()),
+        ("loops closed", figures.loops.to_string()),
+        ("relocalisations", figures.relocalisations.to_string()),
+    ];
+    rows.extend(figures.tracked_ate_m.map(|ate| ("ATE as tracked", format!("{ate:.6} m"))));
+    let counts =
+        [("frames too late", figures.late_frames), ("keyframes given up", figures.retired_keyframes)];
+    rows.extend(counts.iter().filter(|(_, n)| *n > 0).map(|(label, n)| (*label, n.to_string())));
     rows
 }
 

@@ -23,6 +23,12 @@ pub struct TrajectoryFigures {
     pub rpe_translation_m: Statistics,
     /// Relative pose error from frame to frame, rotation.
     pub rpe_rotation_deg: Statistics,
+    /// Relative pose error from the first to the last frame, translation; 0 in runs of old versions.
+    #[serde(default)]
+    pub end_drift_m: f64,
+    /// Its rotation angle.
+    #[serde(default)]
+    pub end_drift_deg: f64,
 }
 
 impl From<&TrajectoryEvaluation> for TrajectoryFigures {
@@ -36,6 +42,8 @@ impl From<&TrajectoryEvaluation> for TrajectoryFigures {
             share_within_2cm: evaluation.share_within_2cm,
             rpe_translation_m: evaluation.rpe_translation,
             rpe_rotation_deg: evaluation.rpe_rotation.scaled(1f64.to_degrees()),
+            end_drift_m: evaluation.end_drift.translation.norm(),
+            end_drift_deg: evaluation.end_drift.rotation.angle().to_degrees(),
         }
     }
 }

@@ -67,6 +67,8 @@ pub struct TrajectoryEvaluation {
     pub rpe_translation: Statistics,
     /// Rotation angle of the same relative pose error.
     pub rpe_rotation: Statistics,
+    /// The relative pose error from the first to the last match: what a trajectory has drifted by its end.
+    pub end_drift: RigidTransform,
     /// Share (0 to 1) of the reference poses that have a match.
     pub reference_coverage: f64,
     /// Share (0 to 1) of the estimated poses that have a match.
@@ -101,12 +103,15 @@ pub fn evaluate_trajectory(
     let steps = relative_errors(&truth, &found);
     let lengths: Vec<f64> = steps.iter().map(|e| e.translation.norm()).collect();
     let angles: Vec<f64> = steps.iter().map(|e| so3::log(&e.rotation).norm()).collect();
+    let ends = |poses: &[RigidTransform]| [poses[0], poses[poses.len() - 1]];
+    let end_drift = relative_errors(&ends(&truth), &ends(&found))[0];
     let figures = |errors: &[f64]| Statistics::of(errors).ok_or(TrajectoryError::NotFinite);
     Ok(TrajectoryEvaluation {
         ate: figures(&position_errors)?,
         share_within_2cm: share_within(&position_errors, GOOD_FRAME_METRES),
         rpe_translation: figures(&lengths)?,
         rpe_rotation: figures(&angles)?,
+        end_drift,
         reference_coverage: matches.len() as f64 / reference.len() as f64,
         estimate_coverage: matches.len() as f64 / estimate.len() as f64,
         matches,
@@ -164,6 +169,8 @@ mod tests {
         }
         assert!(e.ate.std < 1e-12);
         assert!((e.rpe_translation.rmse - 2.0 * h).abs() < 1e-12);
+        // The first is raised and the last lowered.
+        assert!((e.end_drift.translation.norm() - 2.0 * h).abs() < 1e-12);
         assert_eq!(e.share_within_2cm, 1.0);
     }
 

@@ -9,7 +9,7 @@ use mba_tracker::geometry::RigidTransform;
 use super::keyframe_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
-use super::{FrameRecord, RunError, RunSettings, Summary, frame_record};
+use super::{FrameRecord, FrameStatus, RunError, RunSettings, Summary, frame_record};
 use crate::gaussians::{Gaussians, format_ply};
 use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use crate::whole_file::write_together;
@@ -82,6 +82,17 @@ impl RunWriter {
         if let (Some(old), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
             *old = exposure;
             record.blur_px = blur_px;
+            self.unwritten += 1;
+        }
+    }
+
+    /// A lost frame `index` was found at a pose, its motion is unknown: it counts as weak. Nothing happens if there is no
+    /// such frame.
+    pub fn recover(&mut self, index: usize, world_from_camera: &RigidTransform) {
+        if let (Some(exposure), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
+            let [start, mid, end] = [*world_from_camera; 3];
+            *exposure = TimedExposure { start, mid, end, ..*exposure };
+            (record.status, record.blur_px) = (FrameStatus::Weak, 0.0);
             self.unwritten += 1;
         }
     }
@@ -221,7 +232,7 @@ impl Drop for RunWriter {
 mod tests {
     use nalgebra::Vector3;
 
-    use super::super::{FrameStatus, Run, RunCamera};
+    use super::super::{Run, RunCamera};
     use super::*;
 
     fn settings() -> RunSettings {

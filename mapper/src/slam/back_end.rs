@@ -7,14 +7,18 @@ use super::driver::SlamProgress;
 use super::growing_map::GrowingMap;
 use super::loops::Loops;
 use super::messages::{Instruction, MapperLink, SharpView, Skipped, TrackedFrame};
-use super::settings::{SlamReference, SlamSettings};
+use super::settings::{Arrival, SlamReference, SlamSettings};
 use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
-use crate::run::{FrameStatus, RunError, RunWriter, SlamFigures};
+use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
 use crate::trajectory_file::TimedExposure;
 
 /// Frames between two comparisons of map and keyframe as references.
 const JUDGE_EVERY: usize = 8;
+
+/// The map is the better reference if its residual is below that of the keyframe by this factor: what a map gets wrong
+/// in depth, the residual of the picture does not show.
+const MAP_IS_BETTER: f32 = 0.8;
 
 /// Takes tracked frames, grows the map, and tells the tracker what to do.
 pub(super) struct BackEnd {
@@ -56,10 +60,27 @@ impl BackEnd {
         link: MapperLink,
         observe: &mut impl FnMut(SlamProgress),
     ) -> Result<(), RunError> {
-        for frame in link.frames {
-            let instruction = self.take(frame)?;
+        let MapperLink { frames, instructions } = link;
+        let is_live = self.settings.arrival == Arrival::RealTime;
+        let mut next = None;
+        while let Some(frame) = next.take().or_else(|| frames.recv().ok()) {
+            if is_live {
+                next = frames.try_recv().ok();
+            }
+            let instruction = if next.is_some() {
+                // Behind the camera: only the newest frame is mapped.
+                self.record(&frame)?;
+                Instruction::default()
+            } else {
+                self.take(frame, |effort_left| {
+                    if is_live {
+                        next = next.take().or_else(|| frames.try_recv().ok());
+                    }
+                    effort_left > 0.0 && next.is_none()
+                })?
+            };
             // A tracker that is gone needs no instructions.
-            let _ = link.instructions.send(instruction);
+            let _ = instructions.send(instruction);
             observe(SlamProgress::Frames {
                 frames: self.writer.exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),
@@ -77,44 +98,59 @@ impl BackEnd {
         (self.map, self.writer, figures)
     }
 
-    fn take(&mut self, frame: TrackedFrame) -> Result<Instruction, RunError> {
+    /// Adds a frame to the run; returns its exposure.
+    fn record(&mut self, frame: &TrackedFrame) -> Result<TimedExposure, RunError> {
         let exposure = self.in_this_world(&frame.exposure, frame.moves);
-        if let Some((index, revised, blur_px)) = frame.revision {
-            let revised = self.in_this_world(&revised, frame.moves);
-            self.writer.revise(index, revised, blur_px);
-            self.map.revise(index, &revised);
+        if let Some((index, revised, blur_px)) = &frame.revision {
+            let revised = self.in_this_world(revised, frame.moves);
+            self.writer.revise(*index, revised, *blur_px);
+            self.map.revise(*index, &revised);
         }
-        let Some(image) = frame.image else {
-            let reason = match frame.skipped {
-                Some(Skipped::Late) => {
-                    self.figures.late_frames += 1;
-                    self.writer.push_skipped(exposure, frame.record)?;
-                    return Ok(Instruction::default());
-                }
-                Some(Skipped::Unusable(reason)) => reason,
-                None => String::new(),
-            };
-            self.writer.warn(format!("frame {} skipped: {reason}", frame.index));
-            self.writer.push_skipped(exposure, frame.record)?;
-            return Ok(Instruction::default());
-        };
-        self.writer.push(exposure, frame.record)?;
+        match &frame.skipped {
+            None => self.writer.push(exposure, frame.record)?,
+            Some(Skipped::Late) => {
+                self.figures.late_frames += 1;
+                self.writer.push_skipped(exposure, frame.record)?;
+            }
+            Some(Skipped::Unusable(reason)) => {
+                self.writer.warn(format!("frame {} skipped: {reason}", frame.index));
+                self.writer.push_skipped(exposure, frame.record)?;
+            }
+        }
+        Ok(exposure)
+    }
+
+    /// Adds a frame to the run and to the map, works as long as `goes_on` with the effort that is left, and says what
+    /// the tracker should do.
+    fn take(
+        &mut self,
+        frame: TrackedFrame,
+        goes_on: impl FnMut(f64) -> bool,
+    ) -> Result<Instruction, RunError> {
+        let exposure = self.record(&frame)?;
+        let Some(image) = frame.image else { return Ok(Instruction::default()) };
         match frame.record.status {
             FrameStatus::Lost => {
                 let reference = self.loops.find(&self.map, &image);
                 self.figures.relocalisations += usize::from(reference.is_some());
                 Ok(Instruction { world_move: None, reference })
             }
-            FrameStatus::Ok => Ok(self.map_frame(exposure, frame.record.blur_px, &image)),
+            FrameStatus::Ok => Ok(self.map_frame(exposure, frame.record.blur_px, &image, goes_on)),
             FrameStatus::Weak => {
-                self.map.work(&exposure.mid);
+                self.map.work(&exposure.mid, goes_on);
                 Ok(Instruction::default())
             }
         }
     }
 
     /// Takes in a frame whose pose can be trusted.
-    fn map_frame(&mut self, exposure: TimedExposure, blur_px: f64, image: &RgbdFrame) -> Instruction {
+    fn map_frame(
+        &mut self,
+        exposure: TimedExposure,
+        blur_px: f64,
+        image: &RgbdFrame,
+        goes_on: impl FnMut(f64) -> bool,
+    ) -> Instruction {
         let mut world_move = None;
         let mut pose = exposure.mid;
         if self.map.take(&exposure, blur_px, image) {
@@ -126,7 +162,7 @@ impl BackEnd {
         if let Some(new_world_from_world) = &world_move {
             pose = new_world_from_world.compose(&pose);
         }
-        self.map.work(&pose);
+        self.map.work(&pose, goes_on);
         Instruction { world_move, reference: self.reference(&pose, image) }
     }
 
@@ -170,10 +206,24 @@ impl BackEnd {
         let on_keyframe = residual(&keyframe_view);
         let on_map = self.map.sharp_view(pose).and_then(|view| residual(&view));
         let is_better = match (on_map, on_keyframe) {
-            (Some(map), Some(keyframe)) => map < keyframe,
+            (Some(map), Some(keyframe)) => map < MAP_IS_BETTER * keyframe,
             (on_map, _) => on_map.is_some(),
         };
         (is_better, Some(keyframe_view))
+    }
+
+    /// Looks for the frames that were lost among all keyframes.
+    pub(super) fn find_lost(&mut self, dataset: &Dataset) {
+        let is_lost = |record: &FrameRecord| record.status == FrameStatus::Lost;
+        let records = self.writer.frames().iter().enumerate();
+        let lost: Vec<usize> =
+            records.filter(|(_, record)| is_lost(record)).map(|(index, _)| index).collect();
+        for index in lost {
+            let found = dataset.frame(index).ok().and_then(|image| self.loops.find(&self.map, &image));
+            if let Some(pose) = found.and_then(|view| view.start_from) {
+                self.writer.recover(index, &pose);
+            }
+        }
     }
 
     /// An exposure that was estimated when the world had moved `moves` times.

@@ -63,6 +63,7 @@ pub fn run_slam(
         Ok::<_, SlamError>(tracked?)
     })?;
     let live_seconds = started.elapsed().as_secs_f64();
+    back_end.find_lost(dataset);
     let (grown, mut writer, figures) = back_end.finish();
     let mut bundle = grown.bundle;
     if bundle.state.gaussians.is_empty() {

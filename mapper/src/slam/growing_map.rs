@@ -122,14 +122,15 @@ impl GrowingMap {
         self.bundle.seed_from(newest, DepthSource::Measured);
     }
 
-    /// A frame's share of the work, around a pose.
-    pub(super) fn work(&mut self, world_from_camera: &RigidTransform) {
+    /// A frame's share of the work, around a pose: steps as long as `goes_on` with the effort that is left.
+    pub(super) fn work(&mut self, world_from_camera: &RigidTransform, mut goes_on: impl FnMut(f64) -> bool) {
         if self.bundle.state.gaussians.is_empty() {
             return;
         }
         let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
-        self.effort += EFFORT;
-        while self.effort > 0.0 {
+        // Effort that was not made when there was no time is not made up for.
+        self.effort = self.effort.min(0.0) + EFFORT;
+        while goes_on(self.effort) {
             let k = self.next_keyframe(&near);
             let plan = Schedule::growing(self.bundle.state.frames[k].visits);
             let report = self.bundle.visit(k, &plan);

@@ -1,0 +1,5 @@
+//! Tracking and mapping at the same time.
+
+mod loops;
+mod quality;
+mod stream;

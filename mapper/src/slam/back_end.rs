@@ -1,5 +1,7 @@
 //! The mapper's side of the loop.
 
+use std::time::{Duration, Instant};
+
 use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::RigidTransform;
 
@@ -12,6 +14,9 @@ use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
 use crate::trajectory_file::TimedExposure;
+
+/// Time after which the folder is brought up to date: a run that is killed loses no more.
+const FLUSH_EVERY: Duration = Duration::from_secs(2);
 
 /// Frames between two comparisons of map and keyframe as references.
 const JUDGE_EVERY: usize = 8;
@@ -62,7 +67,7 @@ impl BackEnd {
     ) -> Result<(), RunError> {
         let MapperLink { frames, instructions } = link;
         let is_live = self.settings.arrival == Arrival::RealTime;
-        let mut next = None;
+        let (mut next, mut flushed) = (None, Instant::now());
         while let Some(frame) = next.take().or_else(|| frames.recv().ok()) {
             if is_live {
                 next = frames.try_recv().ok();
@@ -81,6 +86,10 @@ impl BackEnd {
             };
             // A tracker that is gone needs no instructions.
             let _ = instructions.send(instruction);
+            if flushed.elapsed() >= FLUSH_EVERY {
+                self.writer.flush()?;
+                flushed = Instant::now();
+            }
             observe(SlamProgress::Frames {
                 frames: self.writer.exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),

@@ -7,6 +7,7 @@ mod keyframes;
 mod map;
 mod mesh;
 mod render;
+mod slam;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

@@ -20,7 +20,7 @@ impl GrowingMap {
             sensor.depth_scale,
         );
         let view = renderer.render(world_from_camera, Behind::Surroundings);
-        (view.solid >= SOLID).then(|| SharpView {
+        (view.solid >= SOLID).then_some(SharpView {
             rgb: view.rgb,
             depth: view.depth,
             world_from_camera: *world_from_camera,

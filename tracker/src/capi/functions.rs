@@ -84,7 +84,9 @@ pub unsafe extern "C" fn mba_config_compact(
 ) -> i32 {
     let camera = PinholeCamera { width: width as usize, height: height as usize, fx, fy, cx, cy };
     // SAFETY: passed on from the caller.
-    unsafe { write_settings(config, &TrackerConfig::compact(camera, metres_per_unit, InverseResponse::linear())) }
+    unsafe {
+        write_settings(config, &TrackerConfig::compact(camera, metres_per_unit, InverseResponse::linear()))
+    }
 }
 
 /// Writes to `bytes` how much memory `mba_tracker_init` needs, aligned to `MBA_MEMORY_ALIGNMENT`.
@@ -157,7 +159,8 @@ pub unsafe extern "C" fn mba_track(
     code(|| {
         pointers::check_output(result)?;
         // SAFETY: passed on from the caller.
-        let (handle, frame) = unsafe { (pointers::tracker(tracker)?, convert::frame(pointers::read(frame)?)?) };
+        let (handle, frame) =
+            unsafe { (pointers::tracker(tracker)?, convert::frame(pointers::read(frame)?)?) };
         let now = || handle.clock.map_or(0, |clock| clock());
         let before = now();
         let found = handle.tracker.track(&frame).map_err(code_of_frame)?;

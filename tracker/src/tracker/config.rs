@@ -38,6 +38,9 @@ pub struct TrackerConfig {
     pub reference: ReferenceMode,
     /// Richardson-Lucy iterations on a keyframe.
     pub deblur_iterations: usize,
+    /// Keyframes before the current one that a lost tracker looks for, 0 to [`MAX_RECENT_KEYFRAMES`]. Each takes
+    /// memory and, on lost frames only, time.
+    pub recent_keyframes: usize,
     /// Settings of the alignment.
     pub align: AlignSettings,
 }
@@ -63,8 +66,39 @@ impl TrackerConfig {
             region: PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height },
             reference: ReferenceMode::Deblurred,
             deblur_iterations: 4,
+            recent_keyframes: MAX_RECENT_KEYFRAMES,
             align: AlignSettings::default(),
         }
+    }
+
+    /// The defaults for devices with less memory than a phone: depth maps of half the resolution at the least, keyframes
+    /// as captured, no search among earlier ones. Takes 374 KB for 160x120 and 1.34 MB for 320x240 pixels.
+    #[must_use]
+    pub fn compact(camera: PinholeCamera, metres_per_unit: f32, response: InverseResponse) -> Self {
+        let config = Self::new(camera, metres_per_unit, response);
+        Self {
+            surface_level: config.surface_level.max(1),
+            reference: ReferenceMode::Raw,
+            recent_keyframes: 0,
+            ..config
+        }
+    }
+
+    /// The same configuration with accuracy traded for time; [`Effort::Full`] changes nothing.
+    #[must_use]
+    pub fn with_effort(self, effort: Effort) -> Self {
+        let (max_iterations, max_views, view_spacing, deblur_iterations) = match effort {
+            Effort::Full => return self,
+            Effort::Medium => (5, 16, 2.5, 3),
+            Effort::Low => (3, 8, 4.0, 2),
+        };
+        let align = AlignSettings {
+            max_iterations: max_iterations.min(self.align.max_iterations),
+            max_views: max_views.min(self.align.max_views),
+            view_spacing: self.align.view_spacing.max(view_spacing),
+            ..self.align
+        };
+        Self { deblur_iterations: deblur_iterations.min(self.deblur_iterations), align, ..self }
     }
 
     /// Checks every setting.
@@ -95,6 +129,12 @@ impl TrackerConfig {
                 self.surface_level < self.levels,
                 "less than the number of levels",
             ),
+            (
+                "recent_keyframes",
+                self.recent_keyframes as f64,
+                self.recent_keyframes <= MAX_RECENT_KEYFRAMES,
+                "0 to 4",
+            ),
         ];
         match checks.into_iter().find(|check| !check.2) {
             Some((name, value, _, expected)) => Err(ConfigError::Setting { name, value, expected }),
@@ -102,34 +142,81 @@ impl TrackerConfig {
         }
     }
 
-    /// Bytes of memory that a tracker with this configuration needs, see [`workspace_len`].
+    /// Bytes of memory that a tracker with this configuration needs.
     #[must_use]
     pub const fn workspace_len(&self) -> usize {
-        workspace_len(self.camera.width, self.camera.height, self.levels, self.surface_level)
+        WorkspacePlan {
+            width: self.camera.width,
+            height: self.camera.height,
+            levels: self.levels,
+            surface_level: self.surface_level,
+            recent_keyframes: self.recent_keyframes,
+            deblur: matches!(self.reference, ReferenceMode::Deblurred),
+        }
+        .bytes()
     }
 }
 
-/// Keyframes before the current one that a lost tracker looks for.
-pub(super) const RECENT_KEYFRAMES: usize = 4;
+/// How much time a frame may take, see [`TrackerConfig::with_effort`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Effort {
+    /// As accurate as can be.
+    #[default]
+    Full,
+    /// At most 5 linearisations per level and 16 virtual views.
+    Medium,
+    /// At most 3 linearisations per level and 8 virtual views.
+    Low,
+}
+
+/// Upper bound of the keyframes before the current one that a lost tracker looks for.
+pub const MAX_RECENT_KEYFRAMES: usize = 4;
 
 /// Upper bound of the residuals that a robust scale is computed from.
 pub(super) const SCALE_SAMPLES: usize = 4096;
 
-/// Bytes of memory that a tracker needs for images of `width` by `height` pixels, `levels` pyramid levels and
-/// depth maps on level `surface_level`. Known at compile time, so that the memory can be a static array.
+/// What the size of a tracker's memory depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct WorkspacePlan {
+    /// Columns of the images.
+    pub width: usize,
+    /// Rows of the images.
+    pub height: usize,
+    /// Pyramid levels.
+    pub levels: usize,
+    /// Pyramid level of the depth maps, less than `levels`.
+    pub surface_level: usize,
+    /// Keyframes before the current one that a lost tracker looks for.
+    pub recent_keyframes: usize,
+    /// Whether keyframes are deblurred.
+    pub deblur: bool,
+}
+
+impl WorkspacePlan {
+    /// Bytes of memory. Known at compile time, so that the memory can be a static array.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        let Self { width, height, levels, surface_level, .. } = *self;
+        let (surface_width, surface_height) = (width >> surface_level, height >> surface_level);
+        let current =
+            GreyPyramid::bytes(width, height, levels) + slice_bytes::<f32>(surface_width * surface_height);
+        let recent = Keyframe::bytes(surface_width, surface_height, levels - surface_level, 0);
+        let scratch = slice_bytes::<PatchSite>(MAX_KEYPOINTS)
+            + slice_bytes::<PatchCost>(MAX_KEYPOINTS)
+            + slice_bytes::<f32>(SCALE_SAMPLES);
+        ARENA_ALIGNMENT
+            + current
+            + Keyframe::bytes(width, height, levels, surface_level)
+            + self.recent_keyframes * recent
+            + scratch
+            + if self.deblur { DeblurScratch::bytes(width, height) } else { 0 }
+    }
+}
+
+/// Bytes of memory that a tracker with the defaults of [`TrackerConfig::new`] needs for images of `width` by `height`
+/// pixels, `levels` pyramid levels and depth maps on level `surface_level`.
 #[must_use]
 pub const fn workspace_len(width: usize, height: usize, levels: usize, surface_level: usize) -> usize {
-    let (surface_width, surface_height) = (width >> surface_level, height >> surface_level);
-    let current =
-        GreyPyramid::bytes(width, height, levels) + slice_bytes::<f32>(surface_width * surface_height);
-    let recent = Keyframe::bytes(surface_width, surface_height, levels - surface_level, 0);
-    let scratch = slice_bytes::<PatchSite>(MAX_KEYPOINTS)
-        + slice_bytes::<PatchCost>(MAX_KEYPOINTS)
-        + slice_bytes::<f32>(SCALE_SAMPLES);
-    ARENA_ALIGNMENT
-        + current
-        + Keyframe::bytes(width, height, levels, surface_level)
-        + RECENT_KEYFRAMES * recent
-        + scratch
-        + DeblurScratch::bytes(width, height)
+    let recent_keyframes = MAX_RECENT_KEYFRAMES;
+    WorkspacePlan { width, height, levels, surface_level, recent_keyframes, deblur: true }.bytes()
 }

@@ -10,7 +10,7 @@ mod recovery;
 mod result;
 mod track;
 
-pub use config::{ReferenceMode, TrackerConfig, workspace_len};
+pub use config::{Effort, MAX_RECENT_KEYFRAMES, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len};
 pub use frame::{Frame, ReferenceView};
 pub use result::{FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

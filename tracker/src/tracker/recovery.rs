@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
 use super::coarse_to_fine::FrameTask;
-use super::config::RECENT_KEYFRAMES;
+use super::config::MAX_RECENT_KEYFRAMES;
 use super::history::Motion;
 use crate::align::{AlignScratch, AlignSettings, Alignment, FrameData, ReferenceData};
 use crate::geometry::{PinholeCamera, RigidTransform};
@@ -24,7 +24,7 @@ const MAX_DEPTH_RESIDUAL: f32 = 0.012;
 /// Coarse copies of the last keyframes, in a ring.
 #[derive(Debug)]
 pub(super) struct RecentKeyframes<'m> {
-    slots: ArrayVec<Keyframe<'m>, RECENT_KEYFRAMES>,
+    slots: ArrayVec<Keyframe<'m>, MAX_RECENT_KEYFRAMES>,
     filled: usize,
     next: usize,
 }
@@ -39,7 +39,7 @@ impl<'m> RecentKeyframes<'m> {
     ) -> Result<Self, WorkspaceError> {
         let coarse = camera.at_level(surface_level);
         let mut slots = ArrayVec::new();
-        for _ in 0..count.min(RECENT_KEYFRAMES) {
+        for _ in 0..count.min(MAX_RECENT_KEYFRAMES) {
             slots.push(Keyframe::carve(arena, &coarse, levels - surface_level, 0)?);
         }
         Ok(Self { slots, filled: 0, next: 0 })

@@ -5,7 +5,7 @@ use core::mem;
 use fearless_simd::Level;
 
 use super::coarse_to_fine::{Aligned, FrameTask};
-use super::config::{RECENT_KEYFRAMES, ReferenceMode, SCALE_SAMPLES, TrackerConfig};
+use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::Frame;
 use super::history::Motion;
 use super::policy::{Evidence, Typical, judge, wants_keyframe};
@@ -71,13 +71,22 @@ impl<'m> Tracker<'m> {
             depth: InverseDepthMap::carve(&mut arena, camera, surface_level)?,
             depth_share: 0.0,
             keyframe: Keyframe::carve(&mut arena, camera, levels, surface_level)?,
-            recent: RecentKeyframes::carve(&mut arena, camera, levels, surface_level, RECENT_KEYFRAMES)?,
+            recent: RecentKeyframes::carve(
+                &mut arena,
+                camera,
+                levels,
+                surface_level,
+                config.recent_keyframes,
+            )?,
             scratch: AlignScratch {
                 sites: arena.take(MAX_KEYPOINTS)?,
                 costs: arena.take(MAX_KEYPOINTS)?,
                 medians: arena.take(SCALE_SAMPLES)?,
             },
-            deblur: DeblurScratch::carve(&mut arena, camera.width, camera.height)?,
+            deblur: match config.reference {
+                ReferenceMode::Deblurred => DeblurScratch::carve(&mut arena, camera.width, camera.height)?,
+                ReferenceMode::Raw => DeblurScratch::carve(&mut arena, 0, 0)?,
+            },
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),

@@ -20,7 +20,7 @@ pub struct Region {
 }
 
 impl Region {
-    /// The smallest box that has both corners (world, metres) in it. Corners are bounded to ±half of `MOST_CELLS` cells from
+    /// The smallest box that has both corners (world, metres) in it. Corners are bounded to ±256 cells from
     /// the origin; what is no number counts as 0.
     #[must_use]
     pub fn around(least: [f64; 3], most: [f64; 3]) -> Self {

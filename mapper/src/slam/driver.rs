@@ -64,7 +64,7 @@ pub fn run_slam(
     })?;
     let (grown, mut writer) = back_end.finish();
     let mut bundle = grown.bundle;
-    if bundle.state.gaussians.is_empty() {
+    if bundle.state.map.is_empty() {
         return Err(MapError::NoDepth.into());
     }
     let mapping = settings.mapping();

@@ -125,7 +125,7 @@ impl GrowingMap {
 
     /// A frame's share of the work, around a pose.
     pub(super) fn work(&mut self, world_from_camera: &RigidTransform) {
-        if self.bundle.state.gaussians.is_empty() {
+        if self.bundle.state.map.is_empty() {
             return;
         }
         let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);

@@ -14,8 +14,11 @@ use crate::triplane::{
     TriplaneField,
 };
 
-/// Pixels that a step looks at.
+/// Most pixels that a step looks at.
 const PIXELS: usize = 2048;
+
+/// In small pictures it looks at one pixel of so many.
+const PIXEL_SHARE: usize = 8;
 
 /// The box reaches this far beyond what was measured, metres: two truncations.
 const MARGIN: f64 = 0.12;
@@ -76,7 +79,7 @@ impl MapModel for FieldMap {
     ) -> ExposureLoss {
         let given = FieldExposure {
             exposure,
-            pixels: PIXELS,
+            pixels: PIXELS.min(exposure.seen.depth.len() / PIXEL_SHARE + 1),
             weights: FieldWeights::default(),
             sampling: SamplingSettings::default(),
             with_path: plan.path_pixels > 0.0,

@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::driver::{Adjustment, BUDGET_RESERVE, Running, conclude};
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
-use crate::bundle::{BundleAdjustment, DepthSource, Schedule};
+use crate::bundle::{BundleAdjustment, DepthSource, MapKind, Schedule};
 use crate::dataset::Dataset;
 use crate::run::{FrameRecord, RunWriter, Summary};
 use crate::trajectory_file::TimedExposure;
@@ -43,7 +43,7 @@ impl<'a> Finish<'a> {
             bundle.seed_from(k, DepthSource::Completed);
         }
         bundle.change_density();
-        bundle.start(Schedule::finish(steps(bundle)));
+        bundle.start(schedule(bundle));
         Ok(Self { dataset, settings, frames })
     }
 
@@ -61,6 +61,14 @@ impl<'a> Finish<'a> {
         adjustment.run(&mut bundle, &mut running, &mut observe)?;
         running.seconds = started.elapsed().as_secs_f64();
         conclude(self.dataset, bundle, self.frames, self.settings, writer, running)
+    }
+}
+
+/// The schedule of a map that has grown. A field learns with many cheap steps, as many as from nothing.
+fn schedule(bundle: &BundleAdjustment) -> Schedule {
+    match bundle.state.map.kind() {
+        MapKind::Gaussians => Schedule::finish(steps(bundle)),
+        MapKind::Field => Schedule::field(bundle.keyframes().len()),
     }
 }
 

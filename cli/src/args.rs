@@ -2,6 +2,7 @@
 
 pub mod map;
 pub mod slam;
+pub mod surface;
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -60,6 +61,8 @@ pub enum Command {
     Slam(slam::Slam),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
+    /// Write the surface of the map of a RUN folder as a coloured mesh
+    Mesh(surface::Mesh),
     /// Write report.html and charts into a RUN folder
     Report(Report),
     /// Measure an estimate against a reference
@@ -375,6 +378,8 @@ pub enum EvalCommand {
     Trajectory(EvalTrajectory),
     /// PSNR and SSIM of images, and differences of depth maps, against true ones of the same name
     Images(EvalImages),
+    /// Precision, recall and F1 of a surface against a true one
+    Mesh(surface::EvalMesh),
 }
 
 /// Arguments of `mba eval trajectory`.

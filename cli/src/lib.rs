@@ -56,8 +56,10 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Map(args) => commands::map::run(args, console),
         Command::Slam(args) => commands::slam::run(args, console),
         Command::Render(args) => commands::render::run(args, console),
+        Command::Mesh(args) => commands::mesh::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
         Command::Eval(EvalCommand::Images(args)) => commands::eval_images::run(args, console),
+        Command::Eval(EvalCommand::Mesh(args)) => commands::eval_mesh::run(args, console),
     }
 }

@@ -11,7 +11,7 @@
 //!
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
-//! [`rendering`] makes images of a map, with [`infill`] where it has nothing; [`evaluation`] and [`image_folders`] compare
+//! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
 //! results with the truth.
 
 pub mod bundle;
@@ -28,12 +28,14 @@ pub mod infill;
 pub mod losses;
 pub mod mapping;
 pub mod places;
+mod ply;
 mod png;
 pub mod pose_graph;
 pub mod raster;
 pub mod rendering;
 pub mod run;
 pub mod slam;
+pub mod surfaces;
 pub mod synth;
 mod text_lines;
 pub mod tracking;

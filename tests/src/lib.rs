@@ -7,4 +7,5 @@ pub mod raster_golden;
 pub mod raster_scene;
 pub mod reference_values;
 pub mod small_dataset;
+pub mod still_run;
 pub mod transfer_scene;

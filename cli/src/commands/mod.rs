@@ -1,10 +1,13 @@
 //! One file per command.
 
+pub mod alignment;
 pub mod demo;
 pub mod eval_images;
+pub mod eval_mesh;
 pub mod eval_trajectory;
 pub mod info;
 pub mod map;
+pub mod mesh;
 pub mod open;
 pub mod render;
 pub mod report;

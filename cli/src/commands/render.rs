@@ -4,12 +4,13 @@ use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
-use mba_mapper::evaluation::{PoseAlignment, align_poses};
+use mba_mapper::evaluation::PoseAlignment;
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
-use mba_mapper::run::{FrameStatus, MAP_FILE, Run, RunCamera, Spread, StoredMap, mid_pose};
+use mba_mapper::run::{MAP_FILE, Run, RunCamera, Spread, StoredMap};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use serde::Serialize;
 
+use super::alignment::{AlignmentFigures, align};
 use super::open;
 use crate::args::{Render, Switch, ViewNames};
 use crate::console::Console;
@@ -30,14 +31,6 @@ struct Written {
     /// Share (0 to 1) of all pixels with an alpha above one half.
     solid_share: f64,
     alignment: Option<AlignmentFigures>,
-}
-
-/// How well the trajectory of the run agrees with the file of `--align`.
-#[derive(Clone, Debug, Serialize)]
-struct AlignmentFigures {
-    matches: usize,
-    rotation_rms_deg: f64,
-    translation_rms_m: f64,
 }
 
 /// Renders every pose of a file to a colour and a depth image.
@@ -85,20 +78,6 @@ fn poses(path: &Path) -> anyhow::Result<Vec<TimedPose>> {
         return Err(bad_input(message, "it needs a line `timestamp tx ty tz qx qy qz qw` for every view"));
     }
     Ok(poses)
-}
-
-/// Aligns the frames of the run that were not lost with the trajectory in `file`.
-fn align(run: &Run, file: &Path, max_dt: f64) -> anyhow::Result<PoseAlignment> {
-    let reference =
-        read_trajectory(file).or_bad_input("--align needs lines `timestamp tx ty tz qx qy qz qw`")?;
-    let frames = run.exposures.iter().zip(&run.frames);
-    let tracked: Vec<TimedPose> = frames
-        .filter(|(_, record)| record.status != FrameStatus::Lost)
-        .map(|(exposure, _)| mid_pose(exposure))
-        .collect();
-    align_poses(&reference, &tracked, max_dt).or_bad_input(
-        "--align needs a trajectory of the same recording; --max-dt is the time difference allowed",
-    )
 }
 
 fn in_map_frame(poses: &[TimedPose], alignment: Option<&PoseAlignment>) -> Vec<TimedPose> {
@@ -165,16 +144,6 @@ fn name(names: ViewNames, index: usize, pose: &TimedPose) -> String {
     }
 }
 
-impl From<&PoseAlignment> for AlignmentFigures {
-    fn from(alignment: &PoseAlignment) -> Self {
-        Self {
-            matches: alignment.matches,
-            rotation_rms_deg: alignment.rotation_rms.to_degrees(),
-            translation_rms_m: alignment.translation_rms,
-        }
-    }
-}
-
 fn table(written: &Written) -> String {
     let map = match written.gaussians {
         0 => "a tri-plane field".to_owned(),
@@ -191,14 +160,7 @@ fn table(written: &Written) -> String {
             .iter()
             .map(|ms| ("time per view", format!("median {:.1} ms", ms.median))),
     );
-    if let Some(alignment) = &written.alignment {
-        let AlignmentFigures { matches, rotation_rms_deg, translation_rms_m } = alignment;
-        let left = format!(
-            "{matches} frames, {rotation_rms_deg:.2} deg and {:.2} cm left (RMS)",
-            100.0 * translation_rms_m
-        );
-        rows.push(("aligned", left));
-    }
+    rows.extend(written.alignment.as_ref().map(AlignmentFigures::row));
     rows.push(("written to", written.folder.clone()));
     pairs(&rows)
 }

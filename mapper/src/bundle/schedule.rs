@@ -86,8 +86,8 @@ const WHOLE: Pace = Pace {
 const FINISH: Pace = Pace {
     hold: 0.2,
     final_length: 0.3,
-    paths_from: 0.3,
-    path_pixels: 0.015,
+    paths_from: 0.5,
+    path_pixels: 0.01,
     only_motions: false,
     density_changes: 6.0,
 };

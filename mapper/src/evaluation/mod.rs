@@ -7,22 +7,28 @@ mod alignment;
 mod association;
 mod exposure;
 mod figures;
+mod icp;
 mod image;
+mod kd_tree;
 mod pose_alignment;
 mod statistics;
 mod structural_similarity;
+mod surface;
 mod trajectory;
 
 pub use alignment::{Alignment, AlignmentError, Similarity, align};
 pub use association::{DEFAULT_MAX_DT, Match, associate};
 pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, blur_length, evaluate_blur, motion_of};
 pub use figures::{BlurFigures, TrajectoryFigures};
+pub use icp::refine_by_icp;
 pub use image::{DepthDifference, ImageError, depth_difference, psnr, ssim};
+pub use kd_tree::KdTree;
 pub use pose_alignment::{PoseAlignment, PoseAlignmentError, align_poses};
 pub use statistics::{Statistics, quantile, share_within};
 #[cfg(test)]
 pub(crate) use structural_similarity::mean_ssim;
 pub(crate) use structural_similarity::{STABILISERS, WINDOW, window_weights};
+pub use surface::{MeanMedian, SurfaceComparisonError, SurfaceFigures, ThresholdFigures, evaluate_surface};
 pub use trajectory::{
     GOOD_FRAME_METRES, TrajectoryError, TrajectoryEvaluation, TrajectoryOptions, evaluate_trajectory,
 };

@@ -12,14 +12,33 @@ use crate::trajectory_file::TimedExposure;
 /// Steps per frame.
 const STEPS: usize = 24;
 
+/// Which frames between keyframes are fitted to the map; the others are moved along with the keyframes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// All that were tracked.
+    Tracked,
+    /// Those without a pose that can be trusted: the others were tracked in the map's own world.
+    Doubtful,
+}
+
+impl Fit {
+    fn includes(self, status: FrameStatus) -> bool {
+        match self {
+            Self::Tracked => status != FrameStatus::Lost,
+            Self::Doubtful => status != FrameStatus::Ok,
+        }
+    }
+}
+
 /// Exposures and logarithms of the gains of all frames: those of keyframes as they were refined, those of the others
-/// fitted to the map, starting from the tracked ones moved along with the keyframe next to them. Lost frames and those
+/// starting from the tracked ones moved along with the keyframe next to them and, as `fit` says, fitted to the map. Frames
 /// that cannot be read are only moved along.
 pub(super) fn all_exposures(
     dataset: &Dataset,
     bundle: &mut BundleAdjustment,
     frames: &Frames,
     settings: &MapSettings,
+    fit: Fit,
 ) -> Vec<(TimedExposure, f64)> {
     let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
     let sensor = sensor(dataset);
@@ -39,7 +58,7 @@ pub(super) fn all_exposures(
         let mut state = frames.state(index, settings);
         state.path = state.path.seen_from(&moved);
         state.log_gain = reference.log_gain;
-        if frames.records[index].status != FrameStatus::Lost
+        if fit.includes(frames.records[index].status)
             && let Ok(observation) = observation(dataset, &sensor, index)
         {
             let unmapped = Keyframe::new(

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
-use super::between::all_exposures;
+use super::between::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, merit, output};
 use crate::bundle::{BundleAdjustment, BundleState, MapSize};
@@ -99,45 +99,57 @@ pub fn map_dataset(
     let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
     running.seconds = adjustment.seconds();
-    let summary = conclude(dataset, bundle, frames, settings, writer, running)?;
+    let conclusion = Conclusion { dataset, frames, settings, fit: Fit::Tracked };
+    let summary = conclusion.write(bundle, writer, running, |_| ())?;
     RunWriter::remove_checkpoint(out)?;
     Ok(summary)
 }
 
-/// Fits the frames between keyframes to the finished map, repairs what is left, and writes everything.
-pub(super) fn conclude(
-    dataset: &Dataset,
-    mut bundle: BundleAdjustment,
-    mut frames: Frames,
-    settings: &MapSettings,
-    mut writer: RunWriter,
-    running: Running,
-) -> Result<Summary, MapError> {
-    let started = Instant::now();
-    frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
-    let refined = all_exposures(dataset, &mut bundle, &frames, settings);
-    let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
-    let (exposures, repairs) = frames.repair(dataset, &exposures)?;
-    repairs.into_iter().for_each(|repair| writer.warn(repair));
-    let gains: Vec<f64> = refined.iter().map(|(_, log_gain)| log_gain.exp()).collect();
-    output::write(&mut writer, dataset, &bundle, &exposures, &gains)?;
-    let figures = MapFigures {
-        gaussians: bundle.state.map.size().gaussians(),
-        map_file_bytes: writer.map_bytes(),
-        iterations: bundle.state.steps,
-        seconds: running.seconds + started.elapsed().as_secs_f64(),
-        peak_memory_bytes: output::peak_memory_bytes(),
-        loss: running.loss,
-        keyframes: bundle.keyframes().len(),
-        ..merit::image_figures(dataset, &bundle, writer.folder(), &exposures)
-    };
-    let merit = Merit::of(&exposures, dataset);
-    let summary = writer.finish(|summary| {
-        summary.trajectory = merit.trajectory;
-        summary.blur = merit.blur;
-        summary.map = Some(figures);
-    })?;
-    Ok(summary)
+/// What is left to do when the map is finished.
+pub(super) struct Conclusion<'a> {
+    pub(super) dataset: &'a Dataset,
+    pub(super) frames: Frames,
+    pub(super) settings: &'a MapSettings,
+    pub(super) fit: Fit,
+}
+
+impl Conclusion<'_> {
+    /// Poses of the frames between keyframes, repairs of what is left, and all files. `more` completes the summary.
+    pub(super) fn write(
+        mut self,
+        mut bundle: BundleAdjustment,
+        mut writer: RunWriter,
+        running: Running,
+        more: impl FnOnce(&mut Summary),
+    ) -> Result<Summary, MapError> {
+        let started = Instant::now();
+        let dataset = self.dataset;
+        self.frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
+        let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, self.fit);
+        let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
+        let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
+        repairs.into_iter().for_each(|repair| writer.warn(repair));
+        let gains: Vec<f64> = refined.iter().map(|(_, log_gain)| log_gain.exp()).collect();
+        output::write(&mut writer, dataset, &bundle, &exposures, &gains)?;
+        let figures = MapFigures {
+            gaussians: bundle.state.map.size().gaussians(),
+            map_file_bytes: writer.map_bytes(),
+            iterations: bundle.state.steps,
+            seconds: running.seconds + started.elapsed().as_secs_f64(),
+            peak_memory_bytes: output::peak_memory_bytes(),
+            loss: running.loss,
+            keyframes: bundle.keyframes().len(),
+            ..merit::image_figures(dataset, &bundle, writer.folder(), &exposures)
+        };
+        let merit = Merit::of(&exposures, dataset);
+        let summary = writer.finish(|summary| {
+            summary.trajectory = merit.trajectory;
+            summary.blur = merit.blur;
+            summary.map = Some(figures);
+            more(summary);
+        })?;
+        Ok(summary)
+    }
 }
 
 /// The loop of steps and what belongs to it.

@@ -2,7 +2,8 @@
 
 use std::time::Instant;
 
-use super::driver::{Adjustment, BUDGET_RESERVE, Running, conclude};
+use super::between::Fit;
+use super::driver::{Adjustment, BUDGET_RESERVE, Conclusion, Running};
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
 use crate::bundle::{BundleAdjustment, DepthSource, MapKind, Schedule};
@@ -11,10 +12,10 @@ use crate::run::{FrameRecord, RunWriter, Summary};
 use crate::trajectory_file::TimedExposure;
 
 /// Work per keyframe, in virtual views of full resolution.
-const EFFORT: f64 = 16.0;
+const EFFORT: f64 = 28.0;
 
 /// What a step costs besides its views, in views.
-const STEP_COST: f64 = 2.0;
+const STEP_COST: f64 = 3.0;
 
 /// Fewest steps.
 const LEAST_STEPS: usize = 60;
@@ -47,20 +48,23 @@ impl<'a> Finish<'a> {
         Ok(Self { dataset, settings, frames })
     }
 
-    /// Refines, fits the frames between keyframes, and writes everything. `started` is when the run was.
+    /// Refines, fits the frames between keyframes, and writes everything. `started` is when the run was;
+    /// `more` completes the summary.
     pub(crate) fn run(
         self,
         mut bundle: BundleAdjustment,
         writer: RunWriter,
         started: Instant,
         mut observe: impl FnMut(MapProgress),
+        more: impl FnOnce(&mut Summary),
     ) -> Result<Summary, MapError> {
         let budget = self.settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
         let adjustment = Adjustment { budget, checkpoint: None, started: Instant::now(), earlier: 0.0 };
         let mut running = Running::default();
         adjustment.run(&mut bundle, &mut running, &mut observe)?;
         running.seconds = started.elapsed().as_secs_f64();
-        conclude(self.dataset, bundle, self.frames, self.settings, writer, running)
+        let Self { dataset, settings, frames } = self;
+        Conclusion { dataset, frames, settings, fit: Fit::Doubtful }.write(bundle, writer, running, more)
     }
 }
 

@@ -23,13 +23,16 @@ impl Merit {
     /// not determine an alignment, stays absent.
     #[must_use]
     pub fn of(exposures: &[TimedExposure], dataset: &Dataset) -> Self {
-        let poses: Vec<TimedPose> = exposures.iter().map(mid_pose).collect();
-        let evaluation = evaluate_trajectory(dataset.ground_truth(), &poses, &TrajectoryOptions::default());
-        Self {
-            trajectory: evaluation.ok().map(|e| TrajectoryFigures::from(&e)),
-            blur: blur(exposures, dataset),
-        }
+        Self { trajectory: trajectory_figures(exposures, dataset), blur: blur(exposures, dataset) }
     }
+}
+
+/// Trajectory errors after SE(3) alignment; none without a ground truth that can be compared.
+#[must_use]
+pub fn trajectory_figures(exposures: &[TimedExposure], dataset: &Dataset) -> Option<TrajectoryFigures> {
+    let poses: Vec<TimedPose> = exposures.iter().map(mid_pose).collect();
+    let evaluation = evaluate_trajectory(dataset.ground_truth(), &poses, &TrajectoryOptions::default());
+    evaluation.ok().map(|evaluation| TrajectoryFigures::from(&evaluation))
 }
 
 /// The pose at mid exposure.

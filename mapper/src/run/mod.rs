@@ -27,9 +27,9 @@ pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
 pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
 pub use map::{MapFileError, StoredMap};
-pub use merit::{Merit, mid_pose};
+pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
-pub use summary::{FrameCounts, MapFigures, RunSettings, Spread, Summary};
+pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 
 /// Name of the trajectory at mid exposure.

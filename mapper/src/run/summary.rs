@@ -50,6 +50,9 @@ pub struct Summary {
     /// What is known of the map, when the run made one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapFigures>,
+    /// What is known of tracking and mapping at the same time, when the run did that.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub slam: Option<SlamFigures>,
     /// Oddities of the input, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -121,6 +124,30 @@ pub struct MapFigures {
     pub heldout_mapped_share: Option<f64>,
 }
 
+/// How tracking and mapping at the same time went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SlamFigures {
+    /// Frames of the data set over the time from the first frame to the last file, per second.
+    pub frames_per_second: f64,
+    /// Frames over the time until the last one was tracked and mapped, per second.
+    pub live_frames_per_second: f64,
+    /// ATE (RMSE after SE(3) alignment) in metres of the poses as they were tracked, before the refinement; absent
+    /// without ground truth.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tracked_ate_m: Option<f64>,
+    /// Frames that were aligned with a view of the map.
+    pub frames_on_map: usize,
+    /// Frames that came too late for the tracker.
+    pub late_frames: usize,
+    /// Loops that were closed.
+    pub loops: usize,
+    /// Times that a lost tracker was told where it is.
+    pub relocalisations: usize,
+    /// Keyframes that were given up.
+    pub retired_keyframes: usize,
+}
+
 /// Where the bulk and the tail of a quantity lie.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
@@ -176,6 +203,7 @@ impl Summary {
             trajectory: None,
             blur: None,
             map: None,
+            slam: None,
             warnings: Vec::new(),
         }
     }

@@ -6,11 +6,11 @@ use mba_tracker::geometry::RigidTransform;
 use super::driver::SlamProgress;
 use super::growing_map::GrowingMap;
 use super::loops::Loops;
-use super::messages::{Instruction, MapperLink, SharpView, TrackedFrame};
+use super::messages::{Instruction, MapperLink, SharpView, Skipped, TrackedFrame};
 use super::settings::{SlamReference, SlamSettings};
 use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
-use crate::run::{FrameStatus, RunError, RunWriter};
+use crate::run::{FrameStatus, RunError, RunWriter, SlamFigures};
 use crate::trajectory_file::TimedExposure;
 
 /// Frames between two comparisons of map and keyframe as references.
@@ -24,6 +24,7 @@ pub(super) struct BackEnd {
     writer: RunWriter,
     /// Every move of the world so far, `new_world_from_world`.
     moves: Vec<RigidTransform>,
+    figures: SlamFigures,
     /// Whether frames are aligned with the map.
     on_map: bool,
     /// Frames since that was decided.
@@ -43,6 +44,7 @@ impl BackEnd {
             settings: *settings,
             writer,
             moves: Vec::new(),
+            figures: SlamFigures::default(),
             on_map: false,
             undisputed: 0,
         }
@@ -68,9 +70,11 @@ impl BackEnd {
         Ok(())
     }
 
-    /// The map and the run.
-    pub(super) fn finish(self) -> (GrowingMap, RunWriter) {
-        (self.map, self.writer)
+    /// The map, the run, and what was counted.
+    pub(super) fn finish(self) -> (GrowingMap, RunWriter, SlamFigures) {
+        let (loops, retired_keyframes) = (self.loops.closed(), self.map.retired);
+        let figures = SlamFigures { loops, retired_keyframes, ..self.figures };
+        (self.map, self.writer, figures)
     }
 
     fn take(&mut self, frame: TrackedFrame) -> Result<Instruction, RunError> {
@@ -81,7 +85,15 @@ impl BackEnd {
             self.map.revise(index, &revised);
         }
         let Some(image) = frame.image else {
-            let reason = frame.skipped.unwrap_or_default();
+            let reason = match frame.skipped {
+                Some(Skipped::Late) => {
+                    self.figures.late_frames += 1;
+                    self.writer.push_skipped(exposure, frame.record)?;
+                    return Ok(Instruction::default());
+                }
+                Some(Skipped::Unusable(reason)) => reason,
+                None => String::new(),
+            };
             self.writer.warn(format!("frame {} skipped: {reason}", frame.index));
             self.writer.push_skipped(exposure, frame.record)?;
             return Ok(Instruction::default());
@@ -90,6 +102,7 @@ impl BackEnd {
         match frame.record.status {
             FrameStatus::Lost => {
                 let reference = self.loops.find(&self.map, &image);
+                self.figures.relocalisations += usize::from(reference.is_some());
                 Ok(Instruction { world_move: None, reference })
             }
             FrameStatus::Ok => Ok(self.map_frame(exposure, frame.record.blur_px, &image)),
@@ -128,7 +141,7 @@ impl BackEnd {
 
     /// A view for the frames after that from `pose`, if the tracker should change to one.
     fn reference(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> Option<SharpView> {
-        if self.settings.reference != SlamReference::Map || !self.map.is_mature(pose) {
+        if self.settings.reference != SlamReference::Map || !self.map.is_mature() {
             return None;
         }
         self.undisputed += 1;
@@ -141,7 +154,9 @@ impl BackEnd {
                 return keyframe;
             }
         }
-        if self.on_map { self.map.sharp_view(pose) } else { None }
+        let view = if self.on_map { self.map.sharp_view(pose) } else { None };
+        self.figures.frames_on_map += usize::from(view.is_some());
+        view
     }
 
     /// Whether the map explains a frame better than the nearest keyframe does, and that keyframe as a view.

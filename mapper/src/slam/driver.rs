@@ -9,8 +9,8 @@ use super::messages::link;
 use super::settings::SlamSettings;
 use super::{SlamError, front_end};
 use crate::dataset::Dataset;
-use crate::mapping::{Finish, MapError};
-use crate::run::{RunSettings, RunWriter, Summary};
+use crate::mapping::{Finish, MapError, MapProgress};
+use crate::run::{RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
 use crate::tracking::{TrackingError, tracker_config};
 
 /// Where a run stands.
@@ -62,16 +62,29 @@ pub fn run_slam(
         mapped?;
         Ok::<_, SlamError>(tracked?)
     })?;
-    let (grown, mut writer) = back_end.finish();
+    let live_seconds = started.elapsed().as_secs_f64();
+    let (grown, mut writer, figures) = back_end.finish();
     let mut bundle = grown.bundle;
     if bundle.state.map.is_empty() {
         return Err(MapError::NoDepth.into());
     }
+    let frames = dataset.len() as f64;
+    let figures = SlamFigures {
+        live_frames_per_second: frames / live_seconds,
+        tracked_ate_m: trajectory_figures(writer.exposures(), dataset).map(|figures| figures.ate_m.rmse),
+        ..figures
+    };
+    // A run that is stopped from here on has a map, and poses to evaluate.
+    writer.write_map(&bundle.state.map)?;
+    writer.flush()?;
     let mapping = settings.mapping();
     let finish = Finish::new(dataset, &mut bundle, writer.exposures(), writer.frames(), &mapping)?;
-    writer.flush()?;
-    let summary = finish.run(bundle, writer, started, |progress| {
+    let observe = |progress: MapProgress| {
         observe(SlamProgress::Refinement { position: progress.position, psnr: progress.psnr });
+    };
+    let summary = finish.run(bundle, writer, started, observe, |summary| {
+        let frames_per_second = frames / started.elapsed().as_secs_f64();
+        summary.slam = Some(SlamFigures { frames_per_second, ..figures });
     })?;
     Ok(summary)
 }

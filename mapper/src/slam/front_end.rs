@@ -7,7 +7,7 @@ use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
 
-use super::messages::{Instruction, SharpView, TrackedFrame, TrackerLink};
+use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink};
 use super::pace::Pace;
 use super::settings::Arrival;
 use crate::dataset::Dataset;
@@ -68,11 +68,8 @@ pub(super) fn run(
         let arrived = pace.wait_for(dataset.timestamp(index));
         let instructions = front_end.instructions(arrival, index);
         let Some(instructions) = instructions else { return Ok(()) };
-        let tracked = if arrived {
-            front_end.track(index, instructions)
-        } else {
-            front_end.skip(index, "it came too late".into())
-        };
+        let tracked =
+            if arrived { front_end.track(index, instructions) } else { front_end.skip(index, Skipped::Late) };
         if link.frames.send(tracked).is_err() {
             return Ok(());
         }
@@ -95,14 +92,14 @@ impl FrontEnd<'_, '_> {
         let followed = instructions.into_iter().try_for_each(|instruction| self.follow(instruction));
         let following = begin.elapsed();
         let image = match (followed, self.dataset.frame(index)) {
-            (Err(reason), _) => return self.skip(index, reason.to_string()),
-            (_, Err(reason)) => return self.skip(index, reason.to_string()),
+            (Err(reason), _) => return self.skip(index, Skipped::Unusable(reason.to_string())),
+            (_, Err(reason)) => return self.skip(index, Skipped::Unusable(reason.to_string())),
             (Ok(()), Ok(image)) => image,
         };
         let begin = Instant::now();
         let result = match tracker_view(&image).and_then(|frame| self.tracker.track(&frame)) {
             Ok(result) => result,
-            Err(reason) => return self.skip(index, reason.to_string()),
+            Err(reason) => return self.skip(index, Skipped::Unusable(reason.to_string())),
         };
         let ms = (begin.elapsed() + following).as_secs_f64() * 1e3;
         self.given.push(index);
@@ -125,7 +122,7 @@ impl FrontEnd<'_, '_> {
         }
     }
 
-    fn skip(&mut self, index: usize, reason: String) -> TrackedFrame {
+    fn skip(&mut self, index: usize, reason: Skipped) -> TrackedFrame {
         let (exposure, record) = held(self.dataset.timestamp(index), self.last.as_ref());
         let (moves, skipped) = (self.moves, Some(reason));
         TrackedFrame { index, exposure, record, moves, image: None, skipped, revision: None }

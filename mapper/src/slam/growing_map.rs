@@ -21,20 +21,19 @@ const LEVELS: usize = 2;
 const COARSE: usize = 1;
 
 /// Work per frame, in virtual views of the coarser resolution.
-const EFFORT: f64 = 30.0;
+const EFFORT: f64 = 36.0;
 
 /// What a step costs besides its views, in views: comparing pictures and moving Gaussians.
-const STEP_COST: f64 = 2.0;
+const STEP_COST: f64 = 3.0;
 
 /// Pixels that show something new per Gaussian.
-const PIXELS_PER_GAUSSIAN: usize = 6;
+const PIXELS_PER_GAUSSIAN: usize = 9;
 
 /// Keyframes around the newest that are visited most.
 const WINDOW: usize = 8;
 
-/// A map is young until so many keyframes around the camera had so many visits each.
-const YOUNG_KEYFRAMES: usize = 3;
-const YOUNG_VISITS: u32 = 4;
+/// A map is young for so many steps.
+const YOUNG_STEPS: usize = 60;
 
 /// Steps between two changes of density.
 const DENSITY_EVERY: usize = 48;
@@ -50,6 +49,8 @@ pub(super) struct GrowingMap {
     steps: usize,
     /// Pixels that showed something new, in pictures.
     seen: f64,
+    /// Keyframes that were given up.
+    pub(super) retired: usize,
 }
 
 impl GrowingMap {
@@ -59,7 +60,7 @@ impl GrowingMap {
         let level = SimdLevel::new();
         let bundle = BundleAdjustment::new(level, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
         let random = Pcg32::new(settings.seed, 0);
-        Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0 }
+        Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0, retired: 0 }
     }
 
     /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.
@@ -84,6 +85,7 @@ impl GrowingMap {
             && let Some(k) = most_dispensable(&self.bundle, &camera)
         {
             self.bundle.retire(k);
+            self.retired += 1;
         }
         true
     }
@@ -96,12 +98,9 @@ impl GrowingMap {
         }
     }
 
-    /// Whether the map is good enough to track against: the keyframes around a pose were visited often enough.
-    pub(super) fn is_mature(&self, world_from_camera: &RigidTransform) -> bool {
-        let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
-        let visits = |near: &Neighbour| self.bundle.state.frames[near.keyframe].visits;
-        near.len() >= YOUNG_KEYFRAMES
-            && near.iter().take(YOUNG_KEYFRAMES).all(|near| visits(near) >= YOUNG_VISITS)
+    /// Whether the map has had enough steps to be worth a look.
+    pub(super) fn is_mature(&self) -> bool {
+        self.steps >= YOUNG_STEPS
     }
 
     /// The keyframe with the view nearest to a pose, other than frame `index` itself.

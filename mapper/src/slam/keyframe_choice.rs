@@ -7,7 +7,7 @@ use crate::bundle::BundleAdjustment;
 use crate::evaluation::blur_length;
 
 /// Movement of the picture from the nearest keyframe that makes a new view, as a fraction of the width.
-const NEW_VIEW: f64 = 0.02;
+const NEW_VIEW: f64 = 0.01;
 
 /// A frame of a known view is taken if its blur is shorter than that of the keyframe there by this factor.
 const SHARPER: f64 = 0.6;

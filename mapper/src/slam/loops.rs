@@ -18,8 +18,8 @@ const RECENT: usize = 12;
 const MIN_SIMILARITY: f32 = 0.7;
 const MOST_CANDIDATES: usize = 3;
 
-/// Disagreement in pixels below which nothing has drifted.
-const DRIFT_PX: f64 = 1.0;
+/// Disagreement below which nothing has drifted, as a fraction of the width of the picture.
+const DRIFT: f64 = 0.003;
 
 /// Keyframes until the next look after one that found no drift: places around are all seen again and again.
 const PAUSE: usize = 6;
@@ -90,7 +90,8 @@ impl Loops {
         let (before, view, sighting) = self.recognise(map, image, |id| old.contains(&id))?;
         let now = map.bundle.state.frames[newest].path.mid();
         let depth = keyframes[newest].depth;
-        if view_change(&sighting.world_from_camera, &now, &map.sensor.camera, depth) < DRIFT_PX {
+        let camera = &map.sensor.camera;
+        if view_change(&sighting.world_from_camera, &now, camera, depth) < DRIFT * camera.width as f64 {
             self.pause = PAUSE;
             return None;
         }

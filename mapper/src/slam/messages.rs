@@ -26,10 +26,18 @@ pub(super) struct TrackedFrame {
     pub(super) moves: usize,
     /// The frame itself, unless it was skipped.
     pub(super) image: Option<RgbdFrame>,
-    /// Why it was skipped.
-    pub(super) skipped: Option<String>,
+    pub(super) skipped: Option<Skipped>,
     /// Index, exposure and blur in pixels of an earlier frame of which more is known now.
     pub(super) revision: Option<(usize, TimedExposure, f64)>,
+}
+
+/// Why a frame was not tracked.
+#[derive(Debug)]
+pub(super) enum Skipped {
+    /// The next one was there already.
+    Late,
+    /// It cannot be read or used.
+    Unusable(String),
 }
 
 /// To the tracker, one after each frame.

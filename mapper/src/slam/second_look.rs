@@ -34,7 +34,10 @@ impl SecondLook {
     pub(super) fn new(config: &TrackerConfig) -> Self {
         let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
         let deblur_memory = deblurrer.memory();
-        Self { config: config.clone(), memory: vec![0; config.workspace_len()], deblurrer, deblur_memory }
+        let mut config = config.clone();
+        // The whole of what is known: a place is recognised from a single view.
+        config.align.depth_term = true;
+        Self { memory: vec![0; config.workspace_len()], config, deblurrer, deblur_memory }
     }
 
     /// Aligns a frame with a view, from a guess of the frame's pose; `None` if they do not fit.

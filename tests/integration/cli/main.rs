@@ -5,6 +5,7 @@ mod commands;
 mod eval_images;
 mod keyframes;
 mod map;
+mod mesh;
 mod render;
 
 use std::ffi::OsStr;

@@ -6,9 +6,10 @@ use std::path::Path;
 
 use image::{ImageReader, Luma, Rgb, RgbImage};
 use mba_mapper::evaluation::psnr;
-use mba_mapper::gaussians::{Gaussian, Gaussians, write_ply};
-use mba_mapper::run::{FrameRecord, FrameStatus, RunCamera, RunResponse, RunSettings, RunWriter};
-use mba_mapper::trajectory_file::{TimedExposure, TimedPose, write_trajectory};
+use mba_mapper::gaussians::Gaussian;
+use mba_mapper::run::{FrameStatus, RunCamera, RunResponse};
+use mba_mapper::trajectory_file::{TimedPose, write_trajectory};
+use mba_tests::still_run;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{UnitQuaternion, Vector3};
 use tempfile::TempDir;
@@ -41,29 +42,11 @@ fn camera() -> RunCamera {
 fn workplace(camera: Option<RunCamera>) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let run = folder.path().join("run");
-    let (program, dataset, options) = ("mba test".into(), "data".into(), Default::default());
-    let settings = RunSettings { program, dataset, frame_rate: 10.0, camera, options };
-    let mut writer = RunWriter::create(&run, settings).unwrap();
-    for frame in 0..FRAMES {
+    let frame = |frame: usize| {
         let lost = frame == 3;
-        let TimedPose { timestamp, world_from_camera } = pose(if lost { 0 } else { frame });
-        let [start, mid, end] = [world_from_camera; 3];
-        let timestamp = if lost { pose(3).timestamp } else { timestamp };
-        let record = FrameRecord {
-            timestamp,
-            status: if lost { FrameStatus::Lost } else { FrameStatus::Ok },
-            keyframe: 0,
-            ms: 1.0,
-            blur_px: 0.0,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 1.0,
-            inliers: 1.0,
-            gain: 1.0,
-        };
-        writer.push(TimedExposure { timestamp, start, mid, end }, record).unwrap();
-    }
-    writer.finish(|_| ()).unwrap();
+        let found = TimedPose { timestamp: pose(frame).timestamp, ..pose(if lost { 0 } else { frame }) };
+        (found, if lost { FrameStatus::Lost } else { FrameStatus::Ok }, false)
+    };
     let ball = |(mean, colour)| Gaussian {
         mean,
         log_scale: [0.1_f32.ln(); 3],
@@ -71,7 +54,8 @@ fn workplace(camera: Option<RunCamera>) -> TempDir {
         opacity_logit: 5.0,
         colour,
     };
-    write_ply(&run.join("map.ply"), &BALLS.into_iter().map(ball).collect::<Gaussians>()).unwrap();
+    let frames: Vec<_> = (0..FRAMES).map(frame).collect();
+    still_run::write(&run, camera, &frames, &BALLS.into_iter().map(ball).collect());
     let poses: Vec<TimedPose> = (0..FRAMES).map(pose).collect();
     write_trajectory(&folder.path().join("poses.txt"), &poses).unwrap();
     folder

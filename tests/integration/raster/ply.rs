@@ -99,7 +99,7 @@ fn damaged_files_are_named() {
     );
     assert!(with("double", "quad").contains("header line 7: expected a known type"));
     assert!(with("-1.5", "nan").contains("vertex 0: opacity is \"nan\""));
-    assert!(with(" 0.2 -4", "").contains("vertex 0: x is \"\""), "{}", with(" 0.2 -4", ""));
+    assert!(with(" 0.2 -4", "").contains("vertex 0: y is \"\""), "{}", with(" 0.2 -4", ""));
     assert!(with("ascii", "binary_big_endian").contains("expected format ascii"));
 }
 

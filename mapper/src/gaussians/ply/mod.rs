@@ -4,12 +4,10 @@
 //! `f_dc_0..2` (spherical harmonics of degree 0 of the display colour), `opacity` (logit), `scale_0..2` (natural
 //! logarithms) and `rot_0..3` (w x y z). Maps hold linear light: colours are converted on the way.
 
-mod error;
-mod header;
 mod read;
 mod write;
 
-pub use error::PlyError;
+pub use crate::ply::PlyError;
 pub use read::{parse_ply, read_ply};
 pub use write::{format_ply, write_ply};
 

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use super::error::PlyError;
 use crate::gaussians::display_colour::coefficient_of;
 use crate::gaussians::store::{Gaussian, Gaussians};
+use crate::ply::PlyError;
 
 /// Properties in the order of the original implementation. Normals are always zero; some viewers insist on them.
 const PROPERTIES: [&str; 17] = [

@@ -1,9 +1,9 @@
-//! What can be wrong with a file of Gaussians.
+//! What can be wrong with a PLY file.
 
 use std::io;
 use std::path::PathBuf;
 
-/// A file of Gaussians cannot be read or written.
+/// A PLY file cannot be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlyError {
@@ -41,34 +41,54 @@ pub enum PlyError {
         /// The line.
         found: String,
     },
-    /// The vertices lack a property that every file of Gaussians has.
-    #[error("{path}: the vertices have no property \"{name}\", so this is not a file of Gaussians")]
+    /// A property is missing that every file of this kind has.
+    #[error("{path}: the {records} have no property \"{name}\", so this is not {kind}")]
     MissingProperty {
         /// The file.
         path: PathBuf,
+        /// What lacks it, in the plural.
+        records: &'static str,
         /// The property.
         name: &'static str,
+        /// What the file was to be.
+        kind: &'static str,
     },
-    /// The file ends before its last vertex.
-    #[error("{path}: the header announces {announced} vertices, the file ends after {found}")]
+    /// The file ends before its last record.
+    #[error("{path}: the header announces {announced} {records}, the file ends after {found}")]
     Truncated {
         /// The file.
         path: PathBuf,
-        /// Vertices according to the header.
+        /// What there are too few of.
+        records: String,
+        /// Their number according to the header.
         announced: u64,
-        /// Complete vertices.
+        /// Complete ones.
         found: u64,
     },
     /// A value is not a finite number.
-    #[error("{path}, vertex {vertex}: {property} is \"{found}\", which is not a finite number")]
+    #[error("{path}, {element} {index}: {property} is \"{found}\", which is not a finite number")]
     NotFinite {
         /// The file.
         path: PathBuf,
-        /// Vertex, from 0.
-        vertex: u64,
+        /// What has the value.
+        element: String,
+        /// Which one, from 0.
+        index: u64,
         /// The property.
-        property: &'static str,
+        property: String,
         /// The value.
         found: String,
+    },
+    /// A face has a corner that is no vertex.
+    #[error("{path}, face {face}: corner \"{found}\" is none of the {vertices} vertices")]
+    NoSuchVertex {
+        /// The file.
+        path: PathBuf,
+        /// Face, from 0.
+        face: u64,
+        /// The corner.
+        found: f64,
+        /// Number of vertices.
+        vertices: usize,
     },
 }

@@ -1,0 +1,140 @@
+//! `mba mesh`.
+
+use std::time::Instant;
+
+use indicatif::ProgressBar;
+use mba_mapper::run::{FrameStatus, MAP_FILE, Run};
+use mba_mapper::surfaces::{
+    DepthView, FusionSettings, MapViews, PASSES, SurfaceError, Trim, ViewSource, surface_of_views, write_mesh,
+};
+use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use serde::Serialize;
+
+use super::alignment::{AlignmentFigures, align};
+use super::open;
+use crate::args::surface::Mesh;
+use crate::console::Console;
+use crate::failure::{OrBadInput, bad_input, is_disk_full};
+use crate::report::table::pairs;
+
+/// What is printed.
+#[derive(Clone, Debug, Serialize)]
+struct Written {
+    file: String,
+    vertices: usize,
+    triangles: usize,
+    area_m2: f64,
+    voxel_cm: f64,
+    views: usize,
+    seconds: f64,
+    alignment: Option<AlignmentFigures>,
+}
+
+/// Writes the surface of a run's map.
+///
+/// # Errors
+/// Bad input when run, map or trajectory cannot be used or the voxels are too small; failure when the mesh cannot be
+/// written.
+pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
+    let start = Instant::now();
+    let run = open::run(&args.run)?;
+    let map = open::map(&run)?;
+    let camera = camera(&run)?;
+    let poses = keyframe_poses(&run)?;
+    let views = poses.len();
+    let alignment = args.align.as_ref().map(|file| align(&run, file, args.max_dt)).transpose()?;
+    let progress = console.progress(PASSES * views, "surface");
+    let mut source = Watched { views: MapViews::new(&map, camera, poses), progress };
+    let settings = FusionSettings { voxel: 0.01 * args.voxel_cm, ..FusionSettings::default() };
+    let trim = Trim { least_area: 1e-4 * args.least_area_cm2 };
+    let mut mesh = surface_of_views(&mut source, &settings, &trim)
+        .map_err(|error| (hint(&error), error))
+        .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
+    source.progress.finish_and_clear();
+    if mesh.triangles.is_empty() {
+        console.warning(format!(
+            "no keyframe sees a surface in {}: the mesh is empty",
+            run.folder.join(MAP_FILE).display()
+        ));
+    }
+    if let Some(alignment) = &alignment {
+        mesh.transform(&alignment.reference_from_estimate);
+    }
+    match write_mesh(&args.out, &mesh) {
+        Err(error) if !is_disk_full(&error) => {
+            Err(error).or_bad_input("name a file for --out that can be written")?;
+        }
+        other => other?,
+    }
+    let written = Written {
+        file: args.out.display().to_string(),
+        vertices: mesh.vertices.len(),
+        triangles: mesh.triangles.len(),
+        area_m2: mesh.area(),
+        voxel_cm: args.voxel_cm,
+        views,
+        seconds: start.elapsed().as_secs_f64(),
+        alignment: alignment.as_ref().map(AlignmentFigures::from),
+    };
+    console.result(&written, table)
+}
+
+fn camera(run: &Run) -> anyhow::Result<PinholeCamera> {
+    let camera = run.summary.settings.camera.as_ref().ok_or_else(|| {
+        bad_input(format!("{} does not tell its camera", run.folder.display()), "make the run again")
+    })?;
+    camera.check().or_bad_input("correct the camera in summary.json, or make the run again")?;
+    Ok(camera.pinhole())
+}
+
+/// Mid-exposure poses of the keyframes, or of all frames of a run without any; lost ones are of no use.
+fn keyframe_poses(run: &Run) -> anyhow::Result<Vec<RigidTransform>> {
+    let poses = |all: bool| -> Vec<RigidTransform> {
+        let frames = run.exposures.iter().zip(&run.frames);
+        let used =
+            frames.filter(|(_, frame)| frame.status != FrameStatus::Lost && (all || frame.keyframe != 0));
+        used.map(|(exposure, _)| exposure.mid).collect()
+    };
+    let keyframes = poses(false);
+    let poses = if keyframes.is_empty() { poses(true) } else { keyframes };
+    if poses.is_empty() {
+        let message = format!("{} has no frame with a pose", run.folder.display());
+        return Err(bad_input(message, "track and map the sequence again"));
+    }
+    Ok(poses)
+}
+
+/// Views that are counted.
+struct Watched<'a> {
+    views: MapViews<'a>,
+    progress: ProgressBar,
+}
+
+impl ViewSource for Watched<'_> {
+    fn count(&self) -> usize {
+        self.views.count()
+    }
+
+    fn view(&mut self, index: usize) -> DepthView {
+        self.progress.inc(1);
+        self.views.view(index)
+    }
+}
+
+fn hint(error: &SurfaceError) -> &'static str {
+    match error {
+        SurfaceError::TooFine { .. } => "give a larger --voxel-cm",
+        _ => "correct --voxel-cm",
+    }
+}
+
+fn table(written: &Written) -> String {
+    let Written { vertices, triangles, area_m2, voxel_cm, views, seconds, .. } = written;
+    let mut rows = vec![
+        ("surface", format!("{area_m2:.2} m2 in {triangles} triangles, {vertices} vertices")),
+        ("fused", format!("{views} views with voxels of {voxel_cm} cm in {seconds:.1} s")),
+    ];
+    rows.extend(written.alignment.as_ref().map(AlignmentFigures::row));
+    rows.push(("written to", written.file.clone()));
+    pairs(&rows)
+}

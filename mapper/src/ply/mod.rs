@@ -1,0 +1,9 @@
+//! What all PLY files have in common: header and records, in ascii or little-endian.
+
+mod error;
+mod header;
+mod records;
+
+pub use error::PlyError;
+pub(crate) use header::{Element, Header};
+pub(crate) use records::Records;

@@ -1,0 +1,49 @@
+//! Surfaces: coloured triangles, where they come from, and their files.
+//!
+//! A [`Mesh`] comes from what cameras see of a map ([`ViewSource`], for Gaussians [`MapViews`]) by [`fuse_views`], or
+//! from a signed distance that is known everywhere by [`mesh_from_field`]. [`Sight`] drops what no camera has seen and
+//! gives colours to the rest; [`surface_of_views`] does all of that.
+
+mod components;
+mod error;
+mod field;
+mod map_views;
+mod marching;
+mod mesh;
+mod mesh_file;
+mod sampling;
+mod sight;
+mod tsdf;
+mod view;
+
+pub use crate::ply::PlyError;
+pub use error::SurfaceError;
+pub use field::{FieldBox, mesh_from_field};
+pub use map_views::MapViews;
+pub use mesh::Mesh;
+pub use mesh_file::{format_mesh, parse_mesh, read_mesh, write_mesh};
+pub use sampling::sample_surface;
+pub use sight::{Sight, Trim};
+pub use tsdf::{FusionSettings, fuse_views};
+pub use view::{DepthView, ViewSource};
+
+/// How often [`surface_of_views`] asks for every view.
+pub const PASSES: usize = 3;
+
+/// The coloured surface that views show: fused, trimmed to what they see, without parts of less than
+/// `trim.least_area`.
+///
+/// # Errors
+/// See [`fuse_views`].
+pub fn surface_of_views(
+    source: &mut dyn ViewSource,
+    settings: &FusionSettings,
+    trim: &Trim,
+) -> Result<Mesh, SurfaceError> {
+    let mesh = fuse_views(source, settings)?;
+    let mut sight = Sight::new(&mesh);
+    for index in 0..source.count() {
+        sight.look(&mesh, &source.view(index), settings.truncation());
+    }
+    Ok(sight.trim(&mesh, trim))
+}

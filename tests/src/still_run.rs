@@ -1,0 +1,40 @@
+//! RUN folders with a given map, poses without motion during the exposure, and no data set behind them.
+
+use std::path::Path;
+
+use mba_mapper::gaussians::{Gaussians, write_ply};
+use mba_mapper::run::{FrameRecord, FrameStatus, MAP_FILE, RunCamera, RunSettings, RunWriter};
+use mba_mapper::trajectory_file::{TimedExposure, TimedPose};
+
+/// Writes a run into the folder `run`; frames have pose, status and whether they are keyframes.
+///
+/// # Panics
+/// When it cannot be written.
+pub fn write(
+    run: &Path,
+    camera: Option<RunCamera>,
+    frames: &[(TimedPose, FrameStatus, bool)],
+    map: &Gaussians,
+) {
+    let (program, dataset, options) = ("mba test".into(), "data".into(), Default::default());
+    let settings = RunSettings { program, dataset, frame_rate: 10.0, camera, options };
+    let mut writer = RunWriter::create(run, settings).expect("a run");
+    for (TimedPose { timestamp, world_from_camera }, status, keyframe) in frames {
+        let [start, mid, end] = [*world_from_camera; 3];
+        let record = FrameRecord {
+            timestamp: *timestamp,
+            status: *status,
+            keyframe: u8::from(*keyframe),
+            ms: 1.0,
+            blur_px: 0.0,
+            virtual_views: 1,
+            iterations: 1,
+            residual: 1.0,
+            inliers: 1.0,
+            gain: 1.0,
+        };
+        writer.push(TimedExposure { timestamp: *timestamp, start, mid, end }, record).expect("a frame");
+    }
+    writer.finish(|_| ()).expect("a finished run");
+    write_ply(&run.join(MAP_FILE), map).expect("a map");
+}

@@ -66,10 +66,7 @@ fn a_field_survives_a_kill_and_is_rendered_from_its_file() {
     let folder = sequence.path("");
     const FIELD: [&str; 2] = ["--field", "triplane"];
     let whole = map(&folder, "whole", &FIELD).json();
-    assert_eq!(
-        (&whole["map"]["gaussians"], &whole["settings"]["options"]["field"]),
-        (&0.into(), &FIELD[1].into())
-    );
+    assert_eq!((&whole["map"]["gaussians"], &whole["options"]["field"]), (&0.into(), &FIELD[1].into()));
     let seconds = whole["map"]["seconds"].as_f64().unwrap();
     let interval = ["--checkpoint-interval", "0.1"];
     kill(&folder, "parts", &[FIELD, interval].concat(), Duration::from_secs_f64(0.2 * seconds));

@@ -1,7 +1,8 @@
 //! A bundle that is being adjusted: blurred frames of the synthetic room and a map seeded from them.
 
 use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor, StepReport,
+    BundleAdjustment, BundleSettings, FrameState, Keyframe, MapKind, ObservationPyramid, PathPrior, Sensor,
+    StepReport,
 };
 use mba_mapper::dataset::RgbdFrame;
 use mba_mapper::exposure::ExposurePath;
@@ -55,8 +56,9 @@ impl BundleInput {
             frames.iter().map(|frame| FrameState::new(ExposurePath::linear(frame.exposure))).collect();
         let keyframes =
             (0..).zip(frames).filter_map(|(index, frame)| keyframe(&sensor, index, frame)).collect();
-        let settings =
-            BundleSettings { blur: true, max_views: VIEWS, max_gaussians: width * height / 3, seed: 1 };
+        let kind = MapKind::Gaussians;
+        let max_gaussians = width * height / 3;
+        let settings = BundleSettings { kind, blur: true, max_views: VIEWS, max_gaussians, seed: 1 };
         let mut bundle = BundleAdjustment::new(level, sensor, settings, keyframes, states);
         bundle.seed();
         for k in 1..=GROWING {
@@ -74,7 +76,7 @@ impl BundleInput {
     /// Gaussians in the map.
     #[must_use]
     pub fn gaussians(&self) -> usize {
-        self.bundle.state.gaussians.len()
+        self.bundle.state.map.size().gaussians()
     }
 
     /// One step on the next keyframe; the schedule does not move.

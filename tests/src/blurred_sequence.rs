@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use mba_mapper::dataset::{self, Dataset};
 use mba_mapper::evaluation::{blur_length, motion_of};
 use mba_mapper::mapping::{MapSettings, map_dataset};
-use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, StoredMap, Summary};
 use mba_mapper::slam::{SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
 use mba_mapper::tracking::{TrackingOptions, track_dataset};
@@ -158,7 +158,10 @@ pub fn names(folder: &Path) -> Vec<String> {
 /// # Panics
 /// When they differ.
 pub fn assert_same_map(one: &Path, two: &Path) {
-    let mut files: Vec<PathBuf> = ["map.ply", "exposures.txt", "trajectory.txt"].map(PathBuf::from).into();
+    let map = StoredMap::path(one).expect("a map");
+    let map = map.file_name().expect("the name of a file");
+    let mut files: Vec<PathBuf> =
+        [map, "exposures.txt".as_ref(), "trajectory.txt".as_ref()].map(PathBuf::from).into();
     for images in ["deblurred", "depth"] {
         assert_eq!(names(&one.join(images)), names(&two.join(images)));
         files.extend(names(&one.join(images)).iter().map(|name| Path::new(images).join(name)));

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
+use mba_mapper::bundle::MapKind;
 use mba_mapper::mapping::MapSettings;
 
 use super::BlurMode;
@@ -12,8 +13,8 @@ use super::BlurMode;
 /// Arguments of `mba map`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-RUN2 gets map.ply, which opens in any viewer of Gaussian splats, deblurred/ and depth/ with a PNG per keyframe, \
-and refined poses of all frames in the files that `mba track` writes.
+RUN2 gets map.ply, which opens in any viewer of Gaussian splats, or map.mbaf with the tri-plane field, deblurred/ \
+and depth/ with a PNG per keyframe, and refined poses of all frames in the files that `mba track` writes.
 
 A run that was stopped, by a kill too, goes on with --resume and ends with the same files as one that was not.
 
@@ -73,11 +74,34 @@ pub enum Field {
     /// 3D Gaussians
     #[default]
     Gaussians,
+    /// A tri-plane field of signed distance and colour
+    Triplane,
+}
+
+impl Field {
+    /// As on the command line.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gaussians => "gaussians",
+            Self::Triplane => "triplane",
+        }
+    }
+}
+
+impl From<Field> for MapKind {
+    fn from(field: Field) -> Self {
+        match field {
+            Field::Gaussians => Self::Gaussians,
+            Field::Triplane => Self::Field,
+        }
+    }
 }
 
 impl From<&Mapping> for MapSettings {
     fn from(args: &Mapping) -> Self {
         Self {
+            kind: args.field.into(),
             blur: args.blur == BlurMode::Auto,
             virtual_views: args.virtual_views.map(NonZeroUsize::get),
             max_keyframes: args.max_keyframes.get(),

@@ -113,6 +113,7 @@ impl From<&Slamming> for SlamSettings {
     fn from(args: &Slamming) -> Self {
         let Ablation { blur, virtual_views, reference, depth_term, loops } = args.ablation;
         Self {
+            kind: args.field.into(),
             blur: blur == BlurMode::Auto,
             virtual_views,
             reference: match reference {

@@ -45,10 +45,7 @@ pub fn map_into(
     let progress = console.progress(PROGRESS_STEPS, "mapping");
     let observe = |at: MapProgress| {
         progress.set_position((at.position * PROGRESS_STEPS as f64) as u64);
-        progress.set_message(format!(
-            "mapping: {} Gaussians, loss {:.4}, {:.1} dB",
-            at.gaussians, at.loss, at.psnr
-        ));
+        progress.set_message(format!("mapping: {}, loss {:.4}, {:.1} dB", at.size, at.loss, at.psnr));
     };
     let mapped = map_dataset(dataset, run, &settings, out, resume, describe(dataset, run, args), observe);
     progress.finish_and_clear();
@@ -65,7 +62,7 @@ fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
     let absolute =
         |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string();
     let values = json!({
-        "field": "gaussians",
+        "field": args.field.name(),
         "trajectory": absolute(&run.folder),
         "blur": if args.blur == BlurMode::Auto { "auto" } else { "off" },
         "virtual_views": args.virtual_views.map_or_else(|| json!("auto"), |n| json!(n)),

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
-use mba_mapper::gaussians::{Gaussians, read_ply};
-use mba_mapper::run::{MAP_FILE, Run, RunError};
+use mba_mapper::run::{FIELD_FILE, MAP_FILE, Run, RunError, StoredMap};
 
 use crate::failure::{OrBadInput, bad_input};
 
@@ -32,13 +31,13 @@ pub fn run(folder: &Path) -> anyhow::Result<Run> {
 ///
 /// # Errors
 /// Bad input with advice.
-pub fn map(run: &Run) -> anyhow::Result<Gaussians> {
-    let path = run.folder.join(MAP_FILE);
-    if !path.is_file() {
-        let message = format!("{} has no map: there is no {MAP_FILE}", run.folder.display());
+pub fn map(run: &Run) -> anyhow::Result<StoredMap> {
+    let Some(path) = StoredMap::path(&run.folder) else {
+        let message =
+            format!("{} has no map: there is no {MAP_FILE} and no {FIELD_FILE}", run.folder.display());
         return Err(bad_input(message, "`mba map` makes one from the data set and a tracked run"));
-    }
-    read_ply(&path).or_bad_input("restore the file, or map the sequence again")
+    };
+    StoredMap::read(&path).or_bad_input("restore the file, or map the sequence again")
 }
 
 fn advise<T, E>((hint, error): (&'static str, E)) -> anyhow::Result<T>

@@ -5,9 +5,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use mba_mapper::evaluation::PoseAlignment;
-use mba_mapper::gaussians::Gaussians;
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
-use mba_mapper::run::{MAP_FILE, Run, RunCamera, Spread};
+use mba_mapper::run::{MAP_FILE, Run, RunCamera, Spread, StoredMap};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use serde::Serialize;
 
@@ -25,6 +24,7 @@ struct Written {
     views: usize,
     width: usize,
     height: usize,
+    /// Gaussians of the map; 0 for a tri-plane field.
     gaussians: usize,
     /// Time to render and encode a view, without writing files, milliseconds.
     milliseconds_per_view: Option<Spread>,
@@ -91,7 +91,7 @@ fn in_map_frame(poses: &[TimedPose], alignment: Option<&PoseAlignment>) -> Vec<T
 }
 
 fn render_all(
-    map: &Gaussians,
+    map: &StoredMap,
     camera: &RunCamera,
     poses: &[TimedPose],
     args: &Render,
@@ -121,7 +121,7 @@ fn render_all(
         views: poses.len(),
         width: camera.width,
         height: camera.height,
-        gaussians: map.len(),
+        gaussians: map.gaussians(),
         milliseconds_per_view: Spread::of(&times),
         solid_share: solid,
         alignment: None,
@@ -145,9 +145,13 @@ fn name(names: ViewNames, index: usize, pose: &TimedPose) -> String {
 }
 
 fn table(written: &Written) -> String {
+    let map = match written.gaussians {
+        0 => "a tri-plane field".to_owned(),
+        count => format!("{count} Gaussians"),
+    };
     let mut rows = vec![
         ("views", format!("{} of {} x {} pixels", written.views, written.width, written.height)),
-        ("Gaussians", written.gaussians.to_string()),
+        ("map", map),
         ("pixels showing the map", percent(written.solid_share)),
     ];
     rows.extend(

@@ -4,9 +4,8 @@ use std::fs;
 
 use image::RgbImage;
 use mba_mapper::dataset::Dataset;
-use mba_mapper::gaussians::{Gaussians, read_ply};
 use mba_mapper::rendering::{Behind, ViewRenderer};
-use mba_mapper::run::{MAP_FILE, Run, RunCamera};
+use mba_mapper::run::{FIELD_FILE, MAP_FILE, Run, RunCamera, StoredMap};
 
 use super::html::escape;
 use super::pictures::jpeg_base64;
@@ -20,29 +19,33 @@ const WIDTH: u32 = 480;
 /// # Errors
 /// When a picture cannot be encoded.
 pub(super) fn section(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<String> {
-    let path = run.folder.join(MAP_FILE);
+    let Some(path) = StoredMap::path(&run.folder) else { return Ok(String::new()) };
     let Ok(file) = fs::metadata(&path) else { return Ok(String::new()) };
-    let map = match read_ply(&path) {
+    let map = match StoredMap::read(&path) {
         Ok(map) => map,
         Err(error) => {
             return Ok(format!("<h2>Map</h2>\n<p class=\"notice\">{}</p>\n", escape(&error.to_string())));
         }
     };
-    let size = format!("{} Gaussians, {:.1} MB", map.len(), file.len() as f64 / 1e6);
+    let megabytes = file.len() as f64 / 1e6;
+    let about = match &map {
+        StoredMap::Gaussians(map) => format!(
+            "{} Gaussians, {megabytes:.1} MB: <code>{MAP_FILE}</code> opens in any viewer of Gaussian splats.",
+            map.len()
+        ),
+        StoredMap::Field(_) => format!("A tri-plane field, {megabytes:.1} MB: <code>{FIELD_FILE}</code>."),
+    };
     let own = run.summary.settings.camera.clone();
     let camera = own.or_else(|| dataset.map(|dataset| RunCamera::from(dataset.calibration())));
     let views = match &camera {
         Some(camera) => views(run, &map, camera)?,
         None => String::new(),
     };
-    Ok(format!(
-        "<h2>Map</h2>\n<p class=\"note\">{size}: <code>{MAP_FILE}</code> opens in any viewer of Gaussian \
-         splats.</p>\n<section class=\"panes\">\n{views}</section>\n"
-    ))
+    Ok(format!("<h2>Map</h2>\n<p class=\"note\">{about}</p>\n<section class=\"panes\">\n{views}</section>\n"))
 }
 
 /// The map from where some frames were taken.
-fn views(run: &Run, map: &Gaussians, camera: &RunCamera) -> anyhow::Result<String> {
+fn views(run: &Run, map: &StoredMap, camera: &RunCamera) -> anyhow::Result<String> {
     let mut renderer =
         ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
     let mut html = String::new();

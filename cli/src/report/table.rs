@@ -85,12 +85,18 @@ pub fn map(figures: &MapFigures) -> String {
 #[must_use]
 pub fn map_rows(figures: &MapFigures) -> Vec<(&'static str, String)> {
     let MapFigures { gaussians, iterations, seconds, peak_memory_bytes, loss, keyframes, .. } = figures;
-    let mut rows = vec![
-        ("Gaussians", gaussians.to_string()),
+    let mut rows = Vec::new();
+    if *gaussians > 0 {
+        rows.push(("Gaussians", gaussians.to_string()));
+    }
+    if figures.map_file_bytes > 0 {
+        rows.push(("map file", format!("{:.1} MB", figures.map_file_bytes as f64 / 1e6)));
+    }
+    rows.extend([
         ("keyframes in the map", keyframes.to_string()),
         ("iterations", format!("{iterations} in {seconds:.0} s")),
         ("loss at the end", format!("{loss:.5}")),
-    ];
+    ]);
     if *peak_memory_bytes > 0 {
         rows.push(("peak memory", format!("{:.0} MB", *peak_memory_bytes as f64 / 1e6)));
     }

@@ -6,30 +6,28 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
-use super::adam;
-use super::density;
-use super::engine::{Engine, Exposure};
+use super::engine::Exposure;
 use super::frame_state::FrameState;
-use super::ledger::Ledger;
 use super::loss::LossTerms;
+use super::map_model::{MapKind, SceneMap, SeedView, Workbench};
 use super::observation::{Observation, ObservationPyramid, Sensor};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
 use super::schedule::{Schedule, StepPlan};
 use super::seeding::{self, DepthSource};
-use crate::gaussians::Gaussians;
-use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
 
 /// How the bundle is adjusted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BundleSettings {
+    /// What the map consists of.
+    pub kind: MapKind,
     /// Whether motion during the exposure is modelled.
     pub blur: bool,
     /// Upper bound of virtual views per exposure.
     pub max_views: usize,
     /// Upper bound of the number of Gaussians.
     pub max_gaussians: usize,
-    /// Seed of the order in which keyframes are visited.
+    /// Seed of the order in which keyframes are visited, and of what is random in the map.
     pub seed: u64,
 }
 
@@ -62,9 +60,7 @@ impl Keyframe {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BundleState {
     /// The map.
-    pub gaussians: Gaussians,
-    /// What is kept of every Gaussian besides.
-    pub(super) ledger: Ledger,
+    pub map: SceneMap,
     /// One per keyframe.
     pub frames: Vec<FrameState>,
     /// Steps made.
@@ -83,11 +79,7 @@ pub struct BundleAdjustment {
     pub(super) keyframes: Vec<Keyframe>,
     settings: BundleSettings,
     schedule: Schedule,
-    sensor: Sensor,
-    level: Level,
-    engine: Engine,
-    /// Memory for rendering what is covered.
-    seeding: (RasterScratch, RasterImage),
+    bench: Workbench,
     /// Order of the visits of the current round, and which round that is.
     round: (usize, Vec<usize>),
 }
@@ -106,8 +98,8 @@ pub struct StepReport {
 /// Blur up to this length, pixels, is not seen in a picture: one view shows it.
 const SHARP_PX: f64 = 1.0;
 
-/// Longest growth of the map at one change of density, as a fraction of its size.
-const GROWTH: f64 = 0.15;
+/// Frames that are no keyframes are fitted with numbers of draws from here on, which no step has.
+const FITS_FROM: u64 = 1 << 40;
 
 impl BundleAdjustment {
     /// Keyframes of one sensor with first estimates of their states, and an empty map; [`Self::seed`] fills it.
@@ -121,19 +113,16 @@ impl BundleAdjustment {
         keyframes: Vec<Keyframe>,
         frames: Vec<FrameState>,
     ) -> Self {
-        let engine = Engine::new(level, &sensor);
-        let schedule = Schedule::new(keyframes.len());
+        let schedule = Schedule::of(settings.kind, keyframes.len());
         let state = BundleState {
-            gaussians: Gaussians::default(),
-            ledger: Ledger::default(),
+            map: SceneMap::new(settings.kind, settings.seed),
             frames,
             steps: 0,
             scheduled_steps: 0,
             position: 0.0,
         };
-        let seeding = Default::default();
         let round = (usize::MAX, Vec::new());
-        Self { state, keyframes, settings, schedule, sensor, level, engine, seeding, round }
+        Self { state, keyframes, settings, schedule, bench: Workbench::new(level, sensor), round }
     }
 
     /// The keyframes.
@@ -188,31 +177,24 @@ impl BundleAdjustment {
                 self.seed_from(k, source);
             }
         }
-        self.reorder();
+        self.state.map.model_mut().reorder();
     }
 
-    /// Adds what keyframe `k` sees and the map does not cover. Returns the share (0 to 1) of the picture that was not
-    /// covered.
-    pub fn seed_from(&mut self, k: usize, source: DepthSource) -> f64 {
+    /// Adds what keyframe `k` sees and the map does not cover.
+    pub fn seed_from(&mut self, k: usize, source: DepthSource) {
         let world_from_camera = self.state.frames[k].path.mid();
-        let open = self.open_share(&world_from_camera, 0);
-        let keyframe = &self.keyframes[k];
-        let (seen, alpha) = (keyframe.observation.level(0), &self.seeding.1.alpha);
-        let room = self.settings.max_gaussians.saturating_sub(self.state.gaussians.len());
-        let (map, response) = (&mut self.state.gaussians, &self.sensor.inverse_response);
-        seeding::seed(map, seen, response, &world_from_camera, alpha, source, room);
-        self.state.ledger.enrol(self.state.gaussians.len(), keyframe.index);
-        open
+        let Keyframe { index, observation, .. } = &self.keyframes[k];
+        let view = SeedView { index: *index, seen: observation.level(0), world_from_camera, source };
+        self.state.map.model_mut().seed(&mut self.bench, &view, self.settings.max_gaussians);
     }
 
     /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
     pub fn open_share(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
-        let camera = self.sensor.camera.at_level(level);
-        let view = RasterView { camera, world_from_camera: *world_from_camera, background: [0.0; 3] };
-        let (scratch, image) = (&mut self.seeding.0, &mut self.seeding.1);
-        Rasterizer::new(self.level).forward(&self.state.gaussians, &view, scratch, image);
-        let open = image.alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
-        open as f64 / image.alpha.len().max(1) as f64
+        let Workbench { renderer, sensor, .. } = &mut self.bench;
+        renderer.render(self.state.map.scene(), sensor.camera.at_level(level), world_from_camera);
+        let alpha = &renderer.image.alpha;
+        let open = alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
+        open as f64 / alpha.len().max(1) as f64
     }
 
     /// Number of virtual views that a step with `plan` on keyframe `k` renders.
@@ -245,12 +227,11 @@ impl BundleAdjustment {
         let seen = keyframe.observation.level(plan.level);
         let views = self.views(k, plan);
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-        let loss = self.engine.evaluate(&self.state.gaussians, exposure, plan);
+        let draw = self.state.steps as u64;
+        let loss = self.state.map.model().evaluate(&mut self.bench, exposure, plan, draw);
 
-        let BundleState { gaussians, ledger, frames, steps, .. } = &mut self.state;
-        let (gradients, drawn) = (self.engine.gradients(), self.engine.drawn());
-        adam::step(gaussians, &gradients.parameters, drawn, &plan.lengths, &mut ledger.moments);
-        ledger.pull.add(&gradients.screen, drawn);
+        let BundleState { map, frames, steps, .. } = &mut self.state;
+        map.model_mut().step(&mut self.bench, plan);
         let frame = &mut frames[k];
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
@@ -273,19 +254,21 @@ impl BundleAdjustment {
     /// which the one with the least loss is kept: steps have a length of their own, and would lead away from a path
     /// that is right already.
     pub fn fit_frame(&mut self, unmapped: &Keyframe, frame: &mut FrameState, count: usize) {
-        let plan = StepPlan { level: 1, spacing: 2.0, ..self.schedule.plan(0.1, false) };
+        let plan = StepPlan { level: 1, spacing: 2.0, path_pixels: 0.3, ..self.schedule.plan(0.1, false) };
+        // The same pixels at every step: their losses can be compared.
+        let draw = FITS_FROM + unmapped.index as u64;
         let seen = unmapped.observation.level(plan.level);
         let (mut best, mut least) = (frame.clone(), f64::INFINITY);
         for k in 0..count {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
             let views = self.settings.views(frame.blur_px(&seen.camera, unmapped.depth), &plan);
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-            let loss = self.engine.evaluate(&self.state.gaussians, exposure, &plan);
+            let loss = self.state.map.model().evaluate(&mut self.bench, exposure, &plan, draw);
             if loss.terms.total() < least {
                 (best, least) = (frame.clone(), loss.terms.total());
             }
             let still = !self.settings.blur;
-            let step = PathStep { pixels: 0.3 * shrink, hold: [false, still, still] };
+            let step = PathStep { pixels: plan.path_pixels * shrink, hold: [false, still, still] };
             frame.path_moments.step(&mut frame.path, &loss.by_path, &unmapped.prior, &unmapped.metric, step);
             frame.log_gain += frame.gain_moments.step(loss.by_log_gain, 0.01 * shrink);
         }
@@ -302,27 +285,15 @@ impl BundleAdjustment {
         self.round.1.get(place).copied()
     }
 
-    /// Divides Gaussians that are torn between pixels, removes useless ones, and puts the others in order.
+    /// Puts detail where it is missing and removes what is useless.
     pub fn change_density(&mut self) {
-        let BundleState { gaussians, ledger, .. } = &mut self.state;
-        let count = gaussians.len();
-        let room = self.settings.max_gaussians.saturating_sub(count).min((GROWTH * count as f64) as usize);
-        density::divide(gaussians, ledger, room);
-        density::prune(gaussians, ledger);
-        self.reorder();
-    }
-
-    /// Puts neighbours in space next to each other in memory.
-    fn reorder(&mut self) {
-        let BundleState { gaussians, ledger, .. } = &mut self.state;
-        let order = density::morton_order(gaussians);
-        density::select(gaussians, ledger, &order);
+        self.state.map.model_mut().change_density(self.settings.max_gaussians);
     }
 
     /// Length of the blur of keyframe `k`, full-resolution pixels.
     #[must_use]
     pub fn blur_px(&self, k: usize) -> f64 {
-        self.state.frames[k].blur_px(&self.sensor.camera, self.keyframes[k].depth)
+        self.state.frames[k].blur_px(&self.bench.sensor.camera, self.keyframes[k].depth)
     }
 }
 

@@ -33,8 +33,8 @@ impl WorldMoves {
 }
 
 impl BundleAdjustment {
-    /// Puts the middle of every keyframe's path at a new pose, in the order of the keyframes, which is that of time. Every
-    /// Gaussian moves with the keyframe that it was seeded from, or with the next one in time if that was given up.
+    /// Puts the middle of every keyframe's path at a new pose, in the order of the keyframes, which is that of time. Parts
+    /// of the map move with the keyframes that they belong to.
     pub fn move_keyframes(&mut self, world_from_keyframe: &[RigidTransform]) -> WorldMoves {
         let mut moves = WorldMoves::default();
         let both = self.keyframes.iter_mut().zip(&mut self.state.frames).zip(world_from_keyframe);
@@ -44,12 +44,12 @@ impl BundleAdjustment {
             keyframe.prior.middle = new_world_from_world.compose(&keyframe.prior.middle);
             moves.moves.push((keyframe.index, new_world_from_world));
         }
-        move_gaussians(&mut self.state.gaussians, &self.state.ledger.origins, &moves);
+        self.state.map.model_mut().move_along(&moves);
         moves
     }
 }
 
-fn move_gaussians(gaussians: &mut Gaussians, origins: &[u32], moves: &WorldMoves) {
+pub(super) fn move_gaussians(gaussians: &mut Gaussians, origins: &[u32], moves: &WorldMoves) {
     for (i, origin) in origins.iter().enumerate() {
         if let Some(gaussian) = gaussians.get(i) {
             gaussians.set(i, &moved(&gaussian, &moves.of(*origin as usize)));

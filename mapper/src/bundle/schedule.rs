@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::adam::StepLengths;
 use super::loss::LossWeights;
+use super::map_model::MapKind;
 
 /// How one step is made.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,7 +15,9 @@ pub struct StepPlan {
     pub spacing: f64,
     /// Most virtual views.
     pub max_views: usize,
-    /// Step lengths of the Gaussians.
+    /// Length of a step of the map, relative to the first.
+    pub shrink: f32,
+    /// Step lengths of the Gaussians, shrunk.
     pub lengths: StepLengths,
     /// Step length of the paths, full-resolution pixels.
     pub path_pixels: f64,
@@ -63,17 +66,41 @@ struct Pace {
     paths_from: f64,
     /// First step length of the paths, full-resolution pixels.
     path_pixels: f64,
+    /// Whether paths keep their poses at mid exposure.
+    only_motions: bool,
     /// The density changes this often while it changes.
     density_changes: f64,
 }
 
 /// From a seeded map to a finished one.
-const WHOLE: Pace =
-    Pace { hold: 0.25, final_length: 0.03, paths_from: 0.3, path_pixels: 0.03, density_changes: 16.0 };
+const WHOLE: Pace = Pace {
+    hold: 0.25,
+    final_length: 0.03,
+    paths_from: 0.3,
+    path_pixels: 0.03,
+    only_motions: false,
+    density_changes: 16.0,
+};
 /// From a map that has grown frame by frame to a finished one, in a fraction of the time: steps may not become short
 /// before the details are there, and paths, which are tracked, have little left to go.
-const FINISH: Pace =
-    Pace { hold: 0.2, final_length: 0.3, paths_from: 0.5, path_pixels: 0.01, density_changes: 6.0 };
+const FINISH: Pace = Pace {
+    hold: 0.2,
+    final_length: 0.3,
+    paths_from: 0.5,
+    path_pixels: 0.01,
+    only_motions: false,
+    density_changes: 6.0,
+};
+/// From nothing to a finished field. A step sees few pixels: middles, which the tracker has measured with all of them,
+/// would only be shaken.
+const FIELD: Pace = Pace {
+    hold: 0.3,
+    final_length: 0.05,
+    paths_from: 0.3,
+    path_pixels: 0.01,
+    only_motions: true,
+    density_changes: 0.0,
+};
 /// Position from which the density is final.
 const DENSITY_UNTIL: f64 = 0.6;
 /// Visits from which the path of a keyframe moves while the map grows.
@@ -85,7 +112,16 @@ const LOG_GAIN: f64 = 2e-3;
 const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, alpha: 0.01 };
 
 impl Schedule {
-    /// The schedule for a number of keyframes: every one is visited about as often, whatever their number.
+    /// The schedule for a map of some kind.
+    #[must_use]
+    pub fn of(kind: MapKind, keyframes: usize) -> Self {
+        match kind {
+            MapKind::Gaussians => Self::new(keyframes),
+            MapKind::Field => Self::field(keyframes),
+        }
+    }
+
+    /// The schedule of Gaussians for a number of keyframes: every one is visited about as often, whatever their number.
     #[must_use]
     pub fn new(keyframes: usize) -> Self {
         let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
@@ -93,6 +129,16 @@ impl Schedule {
         let fine = Stage { steps: visits(18, 600), time_share: 0.65, level: 0, spacing: 4.0, max_views: 11 };
         let last = Stage { steps: visits(4, 100), time_share: 0.25, level: 0, spacing: 3.0, max_views: 21 };
         Self { stages: vec![coarse, fine, last], pace: WHOLE }
+    }
+
+    /// The schedule of a tri-plane field for a number of keyframes. Its steps look at few pixels and are many.
+    #[must_use]
+    pub fn field(keyframes: usize) -> Self {
+        let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
+        let coarse = Stage { steps: visits(15, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 5 };
+        let fine = Stage { steps: visits(60, 1200), time_share: 0.6, level: 0, spacing: 5.0, max_views: 9 };
+        let last = Stage { steps: visits(25, 500), time_share: 0.3, level: 0, spacing: 4.0, max_views: 15 };
+        Self { stages: vec![coarse, fine, last], pace: FIELD }
     }
 
     /// The schedule of `steps` steps that finishes a map which has grown frame by frame.
@@ -113,6 +159,7 @@ impl Schedule {
             level: 1,
             spacing: 4.0,
             max_views: 9,
+            shrink: 1.0,
             lengths: LENGTHS,
             path_pixels: FINISH.path_pixels * paths,
             only_motions: true,
@@ -149,16 +196,17 @@ impl Schedule {
     #[must_use]
     pub fn plan(&self, position: f64, timed: bool) -> StepPlan {
         let stage = self.stages[self.stage(position, timed)];
-        let Pace { hold, final_length, paths_from, path_pixels, .. } = self.pace;
+        let Pace { hold, final_length, paths_from, path_pixels, only_motions, .. } = self.pace;
         let shrink = final_length.powf((position - hold).max(0.0) / (1.0 - hold));
         let paths = if position < paths_from { 0.0 } else { shrink };
         StepPlan {
             level: stage.level,
             spacing: stage.spacing,
             max_views: stage.max_views,
+            shrink: shrink as f32,
             lengths: LENGTHS.scaled(shrink as f32),
             path_pixels: path_pixels * paths,
-            only_motions: false,
+            only_motions,
             log_gain: LOG_GAIN * paths,
             weights: WEIGHTS,
         }
@@ -207,6 +255,20 @@ mod tests {
         assert!((end.lengths.mean / start.lengths.mean - 0.3).abs() < 1e-3);
         assert_eq!(Schedule::growing(0).path_pixels, 0.0);
         assert_eq!(Schedule::growing(SETTLED).path_pixels, start.path_pixels);
+    }
+
+    #[test]
+    fn a_field_is_seen_often_and_keeps_the_middles_of_paths() {
+        let schedule = Schedule::of(MapKind::Field, 64);
+        assert_eq!(schedule.steps(), 64 * 100);
+        let [start, end] = [0.0, 1.0].map(|position| schedule.plan(position, false));
+        assert_eq!((start.shrink, start.path_pixels), (1.0, 0.0));
+        assert!((end.shrink - 0.05).abs() < 1e-3 && end.path_pixels > 0.0 && end.only_motions);
+        let changes = (0..100).filter(|&k| {
+            let at = |k: u32| f64::from(k) / 100.0;
+            schedule.density_changes(at(k), at(k + 1))
+        });
+        assert_eq!(changes.count(), 0);
     }
 
     #[test]

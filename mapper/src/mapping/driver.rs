@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::between::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, merit, output};
-use crate::bundle::{BundleAdjustment, BundleState};
+use crate::bundle::{BundleAdjustment, BundleState, MapSize};
 use crate::checkpoint::{Fingerprint, Identity, load, save};
 use crate::dataset::Dataset;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
@@ -17,7 +17,7 @@ use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter
 pub(super) const BUDGET_RESERVE: f64 = 0.1;
 
 /// Layout of the checkpoint's content.
-const CHECKPOINT_VERSION: u32 = 2;
+const CHECKPOINT_VERSION: u32 = 3;
 
 /// Memory of the smoothed loss, steps.
 const SMOOTHING: f64 = 50.0;
@@ -29,8 +29,8 @@ pub struct MapProgress {
     pub position: f64,
     /// Steps so far.
     pub steps: usize,
-    /// Gaussians now.
-    pub gaussians: usize,
+    /// Size of the map now.
+    pub size: MapSize,
     /// Loss, mean of the last steps.
     pub loss: f64,
     /// PSNR of blurred renderings against captured frames in dB, of the mean square of the last steps.
@@ -86,7 +86,7 @@ pub fn map_dataset(
         Some(saved) => (bundle.state, running) = (saved.state, saved.running),
         None => bundle.seed(),
     }
-    if bundle.state.gaussians.is_empty() {
+    if bundle.state.map.is_empty() {
         return Err(MapError::NoDepth);
     }
     // Not before it is known that there will be a map: this replaces an earlier one.
@@ -132,7 +132,8 @@ impl Conclusion<'_> {
         let gains: Vec<f64> = refined.iter().map(|(_, log_gain)| log_gain.exp()).collect();
         output::write(&mut writer, dataset, &bundle, &exposures, &gains)?;
         let figures = MapFigures {
-            gaussians: bundle.state.gaussians.len(),
+            gaussians: bundle.state.map.size().gaussians(),
+            map_file_bytes: writer.map_bytes(),
             iterations: bundle.state.steps,
             seconds: running.seconds + started.elapsed().as_secs_f64(),
             peak_memory_bytes: output::peak_memory_bytes(),
@@ -187,7 +188,7 @@ impl Adjustment<'_> {
             observe(MapProgress {
                 position: bundle.state.position.min(1.0),
                 steps: bundle.state.steps,
-                gaussians: bundle.state.gaussians.len(),
+                size: bundle.state.map.size(),
                 loss: running.loss,
                 psnr: -10.0 * running.mean_square.log10(),
             });

@@ -29,7 +29,7 @@ pub enum MapError {
     /// No frame can be used.
     #[error("no frame was tracked and can be read: {0}")]
     NoKeyframe(String),
-    /// Nothing has a depth that Gaussians could be seeded from.
+    /// Nothing has a depth that a map could start from.
     #[error("no keyframe has any depth: the map stays empty")]
     NoDepth,
     /// The motion of the run makes no sense.

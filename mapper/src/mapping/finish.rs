@@ -6,7 +6,7 @@ use super::between::Fit;
 use super::driver::{Adjustment, BUDGET_RESERVE, Conclusion, Running};
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
-use crate::bundle::{BundleAdjustment, DepthSource, Schedule};
+use crate::bundle::{BundleAdjustment, DepthSource, MapKind, Schedule};
 use crate::dataset::Dataset;
 use crate::run::{FrameRecord, RunWriter, Summary};
 use crate::trajectory_file::TimedExposure;
@@ -44,7 +44,7 @@ impl<'a> Finish<'a> {
             bundle.seed_from(k, DepthSource::Completed);
         }
         bundle.change_density();
-        bundle.start(Schedule::finish(steps(bundle)));
+        bundle.start(schedule(bundle));
         Ok(Self { dataset, settings, frames })
     }
 
@@ -65,6 +65,14 @@ impl<'a> Finish<'a> {
         running.seconds = started.elapsed().as_secs_f64();
         let Self { dataset, settings, frames } = self;
         Conclusion { dataset, frames, settings, fit: Fit::Doubtful }.write(bundle, writer, running, more)
+    }
+}
+
+/// The schedule of a map that has grown. A field learns with many cheap steps, as many as from nothing.
+fn schedule(bundle: &BundleAdjustment) -> Schedule {
+    match bundle.state.map.kind() {
+        MapKind::Gaussians => Schedule::finish(steps(bundle)),
+        MapKind::Field => Schedule::field(bundle.keyframes().len()),
     }
 }
 

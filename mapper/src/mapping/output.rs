@@ -32,10 +32,10 @@ pub(super) fn write(
     for (index, (exposure, gain)) in exposures.iter().zip(gains).enumerate() {
         writer.refine(index, *exposure, *gain, is_keyframe[index]);
     }
-    writer.write_map(&bundle.state.gaussians)?;
+    writer.write_map(&bundle.state.map)?;
     let (camera, response) = (dataset.calibration().camera, dataset.calibration().response.inverse());
     let depth_scale = dataset.calibration().depth_scale;
-    let renderer = || ViewRenderer::new(&bundle.state.gaussians, camera, &response, depth_scale);
+    let renderer = || ViewRenderer::new(&bundle.state.map, camera, &response, depth_scale);
     let pairs: Vec<_> = bundle.keyframes().iter().zip(&bundle.state.frames).collect();
     let write = |renderer: &mut ViewRenderer<'_>, (keyframe, frame): (&Keyframe, &FrameState)| {
         let colour = &keyframe.observation.level(0).colour;

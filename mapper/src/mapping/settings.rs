@@ -4,11 +4,13 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::bundle::BundleSettings;
+use crate::bundle::{BundleSettings, MapKind};
 
 /// Settings of [`map_dataset`](super::map_dataset).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapSettings {
+    /// What the map consists of.
+    pub kind: MapKind,
     /// Whether motion during the exposure is modelled.
     pub blur: bool,
     /// Upper bound of virtual views per exposure; `None` for the schedule's own.
@@ -21,13 +23,14 @@ pub struct MapSettings {
     pub time_budget: Option<Duration>,
     /// Time between two checkpoints; zero for one after every step. It does not change the result.
     pub checkpoint_interval: Duration,
-    /// Seed of the order in which keyframes are visited.
+    /// Seed of the order in which keyframes are visited, and of what is random in the map.
     pub seed: u64,
 }
 
 impl Default for MapSettings {
     fn default() -> Self {
         Self {
+            kind: MapKind::default(),
             blur: true,
             virtual_views: None,
             max_keyframes: 100,
@@ -55,6 +58,7 @@ impl MapSettings {
     pub(crate) fn bundle(&self, pixels: usize) -> BundleSettings {
         let by_size = (pixels / PIXELS_PER_GAUSSIAN).max(2000);
         BundleSettings {
+            kind: self.kind,
             blur: self.blur,
             max_views: self.virtual_views.unwrap_or(usize::MAX),
             max_gaussians: self.max_gaussians.unwrap_or(by_size),

@@ -8,12 +8,12 @@ use mba_tracker::photometric::InverseResponse;
 
 use rayon::prelude::*;
 
+use super::scene::{Scene, SceneRenderer};
 use crate::FileError;
 use crate::deblurring::ForwardResponse;
-use crate::gaussians::Gaussians;
 use crate::infill;
 use crate::png::{encode_depth, encode_rgb};
-use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
+use crate::raster::RasterImage;
 use crate::whole_file::write_together;
 
 /// Above this alpha a pixel shows the map, below it mostly what is behind: nothing, and no depth.
@@ -22,14 +22,12 @@ pub const SOLID_ALPHA: f32 = 0.5;
 /// Renders views of one map with one camera; memory is kept from view to view.
 #[derive(Debug)]
 pub struct ViewRenderer<'a> {
-    map: &'a Gaussians,
+    map: Scene<'a>,
     camera: PinholeCamera,
     depth_scale: f32,
     response: ForwardResponse,
     inverse: InverseResponse,
-    rasterizer: Rasterizer,
-    scratch: RasterScratch,
-    image: RasterImage,
+    renderer: SceneRenderer,
 }
 
 /// What is seen where the map is transparent.
@@ -65,35 +63,32 @@ impl<'a> ViewRenderer<'a> {
     /// Renders `map` as `camera` with that response sees it; depth gets `depth_scale` units per metre.
     #[must_use]
     pub fn new(
-        map: &'a Gaussians,
+        map: impl Into<Scene<'a>>,
         camera: PinholeCamera,
         response: &InverseResponse,
         depth_scale: f64,
     ) -> Self {
         Self {
-            map,
+            map: map.into(),
             camera,
             depth_scale: depth_scale as f32,
             response: ForwardResponse::new(response),
             inverse: response.clone(),
-            rasterizer: Rasterizer::new(SimdLevel::new()),
-            scratch: RasterScratch::default(),
-            image: RasterImage::default(),
+            renderer: SceneRenderer::new(SimdLevel::new()),
         }
     }
 
     /// The view from a pose. It does not depend on the number of threads.
     #[must_use]
     pub fn render(&mut self, world_from_camera: &RigidTransform, behind: Behind<'_>) -> RenderedView {
-        let view =
-            RasterView { camera: self.camera, world_from_camera: *world_from_camera, background: [0.0; 3] };
-        self.rasterizer.forward(self.map, &view, &mut self.scratch, &mut self.image);
+        self.renderer.render(self.map, self.camera, world_from_camera);
+        let image = &mut self.renderer.image;
         match behind {
             Behind::Black => (),
-            Behind::Surroundings => fill_holes(&mut self.image),
-            Behind::Captured { colour, gain } => put_in_front(&mut self.image, &self.inverse, colour, gain),
+            Behind::Surroundings => fill_holes(image),
+            Behind::Captured { colour, gain } => put_in_front(image, &self.inverse, colour, gain),
         }
-        let RasterImage { width, height, colour: [red, green, blue], depth, alpha } = &self.image;
+        let RasterImage { width, height, colour: [red, green, blue], depth, alpha } = &self.renderer.image;
         let colours = red.iter().zip(green).zip(blue).map(|((red, green), blue)| [*red, *green, *blue]);
         let solid = alpha.iter().filter(|alpha| **alpha > SOLID_ALPHA).count();
         RenderedView {
@@ -158,7 +153,7 @@ impl RenderedView {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gaussians::Gaussian;
+    use crate::gaussians::{Gaussian, Gaussians};
 
     /// A grey ball of 10 cm, three metres in front of the camera, that hides half of what is behind its centre.
     fn render(opacity_logit: f32, distance: f32, depth_scale: f64) -> RenderedView {

@@ -6,7 +6,8 @@
 //! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
 //! | `frames.csv` | one [`FrameRecord`] per frame |
 //! | `summary.json` | a [`Summary`] |
-//! | `map.ply` | the map, see [`crate::gaussians::read_ply`] |
+//! | `map.ply` | a map of Gaussians, see [`crate::gaussians::read_ply`], or |
+//! | `map.mbaf` | a map that is a tri-plane field, see [`crate::triplane::read_field`] |
 //! | `deblurred/NNNNNN.png` | the deblurred image of every keyframe, named by the index of the frame |
 //!
 //! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
@@ -15,6 +16,7 @@ mod camera;
 mod error;
 mod frame_record;
 mod keyframe_images;
+mod map;
 mod merit;
 mod reader;
 mod summary;
@@ -24,6 +26,7 @@ pub use camera::{RunCamera, RunResponse};
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus};
 pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
+pub use map::{MapFileError, StoredMap};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
@@ -35,8 +38,10 @@ pub const TRAJECTORY_FILE: &str = "trajectory.txt";
 pub const EXPOSURES_FILE: &str = "exposures.txt";
 /// Name of the table of frames.
 pub const FRAMES_FILE: &str = "frames.csv";
-/// Name of the map.
+/// Name of a map of Gaussians.
 pub const MAP_FILE: &str = "map.ply";
+/// Name of a map that is a tri-plane field.
+pub const FIELD_FILE: &str = "map.mbaf";
 /// Name of the summary.
 pub const SUMMARY_FILE: &str = "summary.json";
 /// Name of what a run that was stopped goes on from.

@@ -87,8 +87,10 @@ impl FrameCounts {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct MapFigures {
-    /// Gaussians in the map.
+    /// Gaussians in the map; 0 for a tri-plane field.
     pub gaussians: usize,
+    /// Bytes of its file.
+    pub map_file_bytes: u64,
     /// Iterations of the optimiser.
     pub iterations: usize,
     /// Time for making the map, seconds.

@@ -8,10 +8,14 @@ use mba_tracker::geometry::RigidTransform;
 
 use super::keyframe_images::remove_keyframe_images;
 use super::merit::mid_pose;
-use super::{CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE};
-use super::{FrameRecord, FrameStatus, RunError, RunSettings, Summary, frame_record};
-use crate::gaussians::{Gaussians, format_ply};
+use super::{
+    CHECKPOINT_FILE, EXPOSURES_FILE, FIELD_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE,
+};
+use super::{FrameRecord, FrameStatus, RunError, RunSettings, StoredMap, Summary, frame_record};
+use crate::gaussians::format_ply;
+use crate::rendering::Scene;
 use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
+use crate::triplane::write_field;
 use crate::whole_file::write_together;
 
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
@@ -142,12 +146,30 @@ impl RunWriter {
             .collect()
     }
 
-    /// Writes the map of the run.
+    /// Writes the map of the run, and removes one of the other kind that an earlier run left.
     ///
     /// # Errors
     /// As [`Self::create`].
-    pub fn write_map(&self, map: &Gaussians) -> Result<(), RunError> {
-        write_together(&[(self.folder.join(MAP_FILE), format_ply(map))]).map_err(RunError::from_write)
+    pub fn write_map<'a>(&self, map: impl Into<Scene<'a>>) -> Result<(), RunError> {
+        let other = match map.into() {
+            Scene::Gaussians(map) => {
+                write_together(&[(self.folder.join(MAP_FILE), format_ply(map))])
+                    .map_err(RunError::from_write)?;
+                FIELD_FILE
+            }
+            Scene::Field(map) => {
+                write_field(&self.folder.join(FIELD_FILE), map).map_err(RunError::from_write)?;
+                MAP_FILE
+            }
+        };
+        remove(&self.folder.join(other))
+    }
+
+    /// Bytes of the file of the map; 0 without one.
+    #[must_use]
+    pub fn map_bytes(&self) -> u64 {
+        let path = StoredMap::path(&self.folder);
+        path.and_then(|path| fs::metadata(path).ok()).map_or(0, |file| file.len())
     }
 
     /// Removes the checkpoint of the finished run in `folder`, also one that a kill left half written.
@@ -157,12 +179,7 @@ impl RunWriter {
     pub fn remove_checkpoint(folder: &Path) -> Result<(), RunError> {
         let path = folder.join(CHECKPOINT_FILE);
         let half_written = path.with_added_extension("partial");
-        [path, half_written].iter().try_for_each(|path| match fs::remove_file(path) {
-            Err(reason) if reason.kind() != io::ErrorKind::NotFound => {
-                Err(RunError::unwritable(path, reason))
-            }
-            _ => Ok(()),
-        })
+        [path, half_written].iter().try_for_each(|path| remove(path))
     }
 
     /// Counts a keyframe whose deblurred image was written.
@@ -216,6 +233,14 @@ impl RunWriter {
             file(SUMMARY_FILE, json + "\n"),
         ])
         .map_err(RunError::from_write)
+    }
+}
+
+/// Removes a file if there is one.
+fn remove(path: &Path) -> Result<(), RunError> {
+    match fs::remove_file(path) {
+        Err(reason) if reason.kind() != io::ErrorKind::NotFound => Err(RunError::unwritable(path, reason)),
+        _ => Ok(()),
     }
 }
 

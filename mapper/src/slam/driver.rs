@@ -66,7 +66,7 @@ pub fn run_slam(
     back_end.find_lost(dataset);
     let (grown, mut writer, figures) = back_end.finish();
     let mut bundle = grown.bundle;
-    if bundle.state.gaussians.is_empty() {
+    if bundle.state.map.is_empty() {
         return Err(MapError::NoDepth.into());
     }
     let frames = dataset.len() as f64;
@@ -76,7 +76,7 @@ pub fn run_slam(
         ..figures
     };
     // A run that is stopped from here on has a map, and poses to evaluate.
-    writer.write_map(&bundle.state.gaussians)?;
+    writer.write_map(&bundle.state.map)?;
     writer.flush()?;
     let mapping = settings.mapping();
     let finish = Finish::new(dataset, &mut bundle, writer.exposures(), writer.frames(), &mapping)?;

@@ -124,7 +124,7 @@ impl GrowingMap {
 
     /// A frame's share of the work, around a pose: steps as long as `goes_on` with the effort that is left.
     pub(super) fn work(&mut self, world_from_camera: &RigidTransform, mut goes_on: impl FnMut(f64) -> bool) {
-        if self.bundle.state.gaussians.is_empty() {
+        if self.bundle.state.map.is_empty() {
             return;
         }
         let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);

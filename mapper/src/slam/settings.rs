@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use mba_tracker::ReferenceMode;
 
+use crate::bundle::MapKind;
 use crate::mapping::MapSettings;
 use crate::tracking::TrackingOptions;
 
@@ -33,6 +34,8 @@ pub enum Arrival {
 /// Settings of [`run_slam`](super::run_slam).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlamSettings {
+    /// What the map consists of.
+    pub kind: MapKind,
     /// Whether motion during the exposure is modelled.
     pub blur: bool,
     /// Upper bound of virtual views per exposure, in tracker and mapper; `None` for as many as the blur asks for.
@@ -58,6 +61,7 @@ pub struct SlamSettings {
 impl Default for SlamSettings {
     fn default() -> Self {
         Self {
+            kind: MapKind::default(),
             blur: true,
             virtual_views: None,
             reference: SlamReference::default(),
@@ -91,6 +95,7 @@ impl SlamSettings {
     #[must_use]
     pub fn mapping(&self) -> MapSettings {
         MapSettings {
+            kind: self.kind,
             blur: self.blur,
             virtual_views: self.virtual_views,
             max_keyframes: self.max_keyframes,

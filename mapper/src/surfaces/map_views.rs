@@ -1,11 +1,11 @@
-//! A map of Gaussians as cameras see it.
+//! A map as cameras see it.
 
 use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 
 use super::{DepthView, ViewSource};
-use crate::gaussians::Gaussians;
-use crate::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
+use crate::raster::RasterImage;
+use crate::rendering::{Scene, SceneRenderer};
 
 /// Depth is used where the map hides at least this share of what is behind it.
 const OPAQUE: f32 = 0.5;
@@ -13,20 +13,17 @@ const OPAQUE: f32 = 0.5;
 /// Views of a map from given poses, rendered whenever they are asked for.
 #[derive(Debug)]
 pub struct MapViews<'a> {
-    map: &'a Gaussians,
+    map: Scene<'a>,
     camera: PinholeCamera,
     poses: Vec<RigidTransform>,
-    rasterizer: Rasterizer,
-    scratch: RasterScratch,
-    image: RasterImage,
+    renderer: SceneRenderer,
 }
 
 impl<'a> MapViews<'a> {
     /// Views by `camera` from `poses` (world from camera).
     #[must_use]
-    pub fn new(map: &'a Gaussians, camera: PinholeCamera, poses: Vec<RigidTransform>) -> Self {
-        let (scratch, image) = (RasterScratch::default(), RasterImage::default());
-        Self { map, camera, poses, rasterizer: Rasterizer::new(SimdLevel::new()), scratch, image }
+    pub fn new(map: impl Into<Scene<'a>>, camera: PinholeCamera, poses: Vec<RigidTransform>) -> Self {
+        Self { map: map.into(), camera, poses, renderer: SceneRenderer::new(SimdLevel::new()) }
     }
 }
 
@@ -37,9 +34,8 @@ impl ViewSource for MapViews<'_> {
 
     fn view(&mut self, index: usize) -> DepthView {
         let (camera, world_from_camera) = (self.camera, self.poses[index]);
-        let view = RasterView { camera, world_from_camera, background: [0.0; 3] };
-        self.rasterizer.forward(self.map, &view, &mut self.scratch, &mut self.image);
-        let RasterImage { colour: [red, green, blue], depth, alpha, .. } = &self.image;
+        self.renderer.render(self.map, camera, &world_from_camera);
+        let RasterImage { colour: [red, green, blue], depth, alpha, .. } = &self.renderer.image;
         // Light and depth are sums of shares that add up to alpha.
         let mean = |sum: f32, alpha: f32| if alpha > OPAQUE { sum / alpha } else { 0.0 };
         let light = red.iter().zip(green).zip(blue).zip(alpha);

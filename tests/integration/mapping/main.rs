@@ -1,5 +1,6 @@
 //! The map of a short blurred sequence, from tracked, true and wrong exposures.
 
+mod field;
 mod quality;
 mod recovery;
 mod settings;

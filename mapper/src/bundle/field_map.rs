@@ -1,0 +1,124 @@
+//! A tri-plane field as the map of the adjustment.
+
+use mba_tracker::geometry::RigidTransform;
+use serde::{Deserialize, Serialize};
+
+use super::engine::{Exposure, ExposureLoss};
+use super::map_model::{MapModel, MapSize, SeedView, Workbench};
+use super::moving::WorldMoves;
+use super::observation::Observation;
+use super::schedule::StepPlan;
+use crate::rendering::Scene;
+use crate::triplane::{
+    FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
+    TriplaneField,
+};
+
+/// Most pixels that a step looks at.
+const PIXELS: usize = 2048;
+
+/// In small pictures it looks at one pixel of so many.
+const PIXEL_SHARE: usize = 8;
+
+/// The box reaches this far beyond what was measured, metres: two truncations.
+const MARGIN: f64 = 0.12;
+
+/// Every so many columns and rows a depth is looked at to find the box.
+const STRIDE: usize = 4;
+
+/// Share of the depths of a frame that decide about the box: a few wrong ones would make it huge.
+const TRUSTED: f64 = 0.995;
+
+/// A field, and what its optimiser remembers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FieldMap {
+    /// The map.
+    pub field: TriplaneField,
+    adam: TriplaneAdam,
+    seed: u64,
+    is_seeded: bool,
+}
+
+impl FieldMap {
+    /// A field around the origin of the world, without any surface; `seed` decides about first values and about the
+    /// pixels that are looked at.
+    #[must_use]
+    pub fn new(seed: u64) -> Self {
+        let field = TriplaneField::new(Region::around([0.0; 3], [0.0; 3]), FieldSettings::default(), seed);
+        Self { field, adam: TriplaneAdam::default(), seed, is_seeded: false }
+    }
+}
+
+impl MapModel for FieldMap {
+    fn scene(&self) -> Scene<'_> {
+        Scene::Field(&self.field)
+    }
+
+    fn is_empty(&self) -> bool {
+        !self.is_seeded
+    }
+
+    fn size(&self) -> MapSize {
+        MapSize::FieldBytes(self.field.bytes())
+    }
+
+    /// Grows the box; surfaces come with the steps.
+    fn seed(&mut self, _bench: &mut Workbench, view: &SeedView<'_>, _most: usize) {
+        if let Some(region) = measured_region(view.seen, &view.world_from_camera) {
+            self.field.grow(&region);
+            self.is_seeded = true;
+        }
+    }
+
+    fn evaluate(
+        &self,
+        bench: &mut Workbench,
+        exposure: Exposure<'_>,
+        plan: &StepPlan,
+        draw: u64,
+    ) -> ExposureLoss {
+        let given = FieldExposure {
+            exposure,
+            pixels: PIXELS.min(exposure.seen.depth.len() / PIXEL_SHARE + 1),
+            weights: FieldWeights::default(),
+            sampling: SamplingSettings::default(),
+            with_path: plan.path_pixels > 0.0,
+            seed: self.seed,
+            step: draw,
+        };
+        bench.field_engine.evaluate(&self.field, &given)
+    }
+
+    fn step(&mut self, bench: &mut Workbench, plan: &StepPlan) {
+        let step = FieldStep::default().scaled(plan.shrink);
+        self.adam.step(bench.level, &mut self.field, bench.field_engine.gradients(), step);
+    }
+
+    /// The planes are as dense everywhere.
+    fn change_density(&mut self, _most: usize) {}
+
+    /// Nodes of planes stay where they are.
+    fn reorder(&mut self) {}
+
+    /// A field has no parts that belong to a keyframe: what moved is learnt again at its new place.
+    fn move_along(&mut self, _moves: &WorldMoves) {}
+}
+
+/// The box around what a frame measured and its camera; `None` without any depth.
+fn measured_region(seen: &Observation, world_from_camera: &RigidTransform) -> Option<Region> {
+    let camera = &seen.camera;
+    let (columns, rows) = (camera.width, camera.height);
+    let pixels = (0..rows).step_by(STRIDE).flat_map(|v| (0..columns).step_by(STRIDE).map(move |u| (u, v)));
+    let measured = |(u, v): (usize, usize)| (u, v, seen.depth[v * columns + u]);
+    let mut depths: Vec<_> = pixels.map(measured).filter(|(_, _, depth)| *depth > 0.0).collect();
+    depths.sort_by(|a, b| a.2.total_cmp(&b.2));
+    depths.truncate((TRUSTED * depths.len() as f64).ceil() as usize);
+    let eye = world_from_camera.translation;
+    let points = depths.iter().map(|&(u, v, depth)| {
+        world_from_camera.transform_point(&(camera.ray(u as f64, v as f64) * f64::from(depth)))
+    });
+    let (least, most) = points.fold((eye, eye), |(least, most), x| (least.inf(&x), most.sup(&x)));
+    let reach = |x: f64| (x - MARGIN, x + MARGIN);
+    (!depths.is_empty())
+        .then(|| Region::around(least.map(|x| reach(x).0).into(), most.map(|x| reach(x).1).into()))
+}

@@ -250,11 +250,13 @@ mod tests {
     fn a_map_that_has_grown_is_finished_at_full_resolution_with_steps_that_stay_long() {
         let schedule = Schedule::finish(100);
         assert_eq!(schedule.steps(), 100);
-        let [start, end] = [0.0, 1.0].map(|position| schedule.plan(position, false));
-        assert!(start.level == 0 && start.path_pixels > 0.0 && end.spacing < start.spacing);
+        let [start, late, end] = [0.0, 0.6, 1.0].map(|position| schedule.plan(position, false));
+        assert!(start.level == 0 && end.spacing < start.spacing);
+        assert!(start.path_pixels == 0.0 && late.path_pixels > end.path_pixels && !late.only_motions);
         assert!((end.lengths.mean / start.lengths.mean - 0.3).abs() < 1e-3);
         assert_eq!(Schedule::growing(0).path_pixels, 0.0);
-        assert_eq!(Schedule::growing(SETTLED).path_pixels, start.path_pixels);
+        let settled = Schedule::growing(SETTLED);
+        assert!(settled.path_pixels > 0.0 && settled.only_motions);
     }
 
     #[test]

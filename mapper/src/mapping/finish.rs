@@ -12,7 +12,7 @@ use crate::run::{FrameRecord, RunWriter, Summary};
 use crate::trajectory_file::TimedExposure;
 
 /// Work per keyframe, in virtual views of full resolution.
-const EFFORT: f64 = 28.0;
+const EFFORT: f64 = 24.0;
 
 /// What a step costs besides its views, in views.
 const STEP_COST: f64 = 3.0;

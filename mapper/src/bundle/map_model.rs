@@ -126,6 +126,7 @@ pub(super) trait MapModel {
 
 /// A map of either kind, with what its optimiser remembers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::large_enum_variant, reason = "a program has one or two, not a list of them")]
 pub enum SceneMap {
     /// 3D Gaussians.
     Gaussians(GaussianMap),

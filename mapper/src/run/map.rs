@@ -9,6 +9,7 @@ use crate::triplane::{FieldFileError, TriplaneField, read_field};
 
 /// A map that was read.
 #[derive(Clone, Debug, PartialEq)]
+#[expect(clippy::large_enum_variant, reason = "a program has one or two, not a list of them")]
 pub enum StoredMap {
     /// 3D Gaussians.
     Gaussians(Gaussians),

@@ -148,7 +148,7 @@ impl Chunk {
     fn find_surfaces(&mut self, job: &Job<'_>) {
         let view = &job.views[job.views.len() / 2];
         let unknown = self.pixels.iter_mut().filter(|pixel| pixel.surface.is_none());
-        let rays: Vec<Ray> = unknown.map(|pixel| ray(job, view, pixel.slope)).collect();
+        let rays: Vec<Ray> = unknown.map(|pixel| within_box(job, view, ray(view, pixel.slope))).collect();
         let found = first_surfaces(job.field, &rays, &mut self.geometry);
         let unknown = self.pixels.iter_mut().filter(|pixel| pixel.surface.is_none());
         unknown.zip(found).for_each(|(pixel, found)| pixel.surface = found);
@@ -165,6 +165,7 @@ impl Chunk {
         for (k, pixel) in self.pixels.iter().enumerate() {
             for (number, view) in job.views.iter().enumerate() {
                 let (start, z) = (self.z.len(), &mut self.z);
+                let ray = ray(view, pixel.slope);
                 match pixel.surface {
                     Some(depth) if pixel.measured > 0.0 && number == middle => {
                         job.sampling.measured(random, depth, truncation, z);
@@ -177,11 +178,10 @@ impl Chunk {
                         job.sampling.expected(random, surfaces, truncation, z);
                     }
                     None => {
-                        stratified(random, ray(job, view, pixel.slope).range, job.sampling.open, z);
+                        stratified(random, within_box(job, view, ray).range, job.sampling.open, z);
                     }
                 }
-                let ray = ray(job, view, pixel.slope);
-                self.z[start..].iter().for_each(|z| self.geometry.push(ray.at(*z)));
+                self.geometry.extend(self.z[start..].iter().map(|z| ray.at(*z)));
                 self.rays.push(PixelRay { pixel: k, view: number, start, end: self.z.len() });
             }
         }
@@ -347,14 +347,15 @@ impl Chunk {
     }
 }
 
-/// The ray of a pixel in a view, up to where it leaves the box.
-fn ray(job: &Job<'_>, view: &View, slope: [f32; 2]) -> Ray {
+/// The ray of a pixel in a view.
+fn ray(view: &View, slope: [f32; 2]) -> Ray {
     let direction = view.field_from_camera.turn([slope[0], slope[1], 1.0]);
-    let origin = view.field_from_camera.translation;
-    let exit = job
-        .field
-        .field
-        .region
-        .exit(&view.world_from_camera.translation, &Vector3::from(direction.map(f64::from)));
-    Ray { origin, direction, range: [NEAREST, exit as f32] }
+    Ray { origin: view.field_from_camera.translation, direction, range: [NEAREST, f32::INFINITY] }
+}
+
+/// The part of a ray up to where it leaves the box.
+fn within_box(job: &Job<'_>, view: &View, ray: Ray) -> Ray {
+    let direction = Vector3::from(ray.direction.map(f64::from));
+    let exit = job.field.field.region.exit(&view.world_from_camera.translation, &direction);
+    Ray { range: [NEAREST, exit as f32], ..ray }
 }

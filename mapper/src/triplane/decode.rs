@@ -24,11 +24,11 @@ pub(super) struct Activations<const OUTPUTS: usize> {
 }
 
 impl<const OUTPUTS: usize> Activations<OUTPUTS> {
-    /// Makes room for `samples`, padded to whole blocks; values of new places are zero.
+    /// Makes room for `samples`, padded to whole blocks with features that are zero.
     pub(super) fn resize(&mut self, samples: usize) {
         let padded = samples.next_multiple_of(BLOCK);
-        self.features.clear();
         self.features.resize(padded, [0.0; FEATURES]);
+        self.features[samples..].fill([0.0; FEATURES]);
         self.hidden.iter_mut().for_each(|layer| layer.resize(padded, [0.0; HIDDEN]));
         self.outputs.resize(padded, [0.0; OUTPUTS]);
     }

@@ -3,11 +3,12 @@
 use fearless_simd::dispatch;
 use rayon::prelude::*;
 
-use super::encode::{PlaneSums, Points, by_plane};
+use super::cells::Points;
 use super::field::TriplaneField;
 use super::layers::Layers;
 use super::planes::FeaturePlanes;
 use super::prepared::Prepared;
+use super::scatter::{PlaneSums, by_plane, nodes_of_cells};
 use super::settings::{CHANNELS, FEATURES};
 
 /// Planes of a field: geometry coarse, geometry fine, colour coarse, colour fine, each xy, xz and yz.
@@ -47,19 +48,22 @@ impl FieldGradients {
     }
 
     /// Adds the gradients by the planes. Every plane adds up the samples in their order, whatever the number of threads.
+    /// Once after a reset.
     pub(super) fn add_planes(&mut self, field: &Prepared<'_>, geometry: &[Group<'_>], colour: &[Group<'_>]) {
-        self.planes.par_iter_mut().enumerate().for_each(|(index, gradient)| {
-            let (level, plane) = (index / 3 % 2, index % 3);
-            let (planes, groups) = match index / 6 {
-                0 => (&field.geometry.planes[level], geometry),
-                _ => (&field.colour.planes[level], colour),
-            };
-            let PlaneGradient { sums, touched } = gradient;
+        let (sets, _) = self.planes.as_chunks_mut::<3>();
+        let heads = [(&field.geometry.planes, geometry), (&field.colour.planes, colour)];
+        let mut tasks = Vec::with_capacity(PLANES / 2);
+        for ([coarse, fine], (levels, groups)) in sets.as_chunks_mut::<2>().0.iter_mut().zip(heads) {
+            let pairs = coarse.iter_mut().zip(fine).enumerate();
+            tasks.extend(pairs.map(|(plane, (coarse, fine))| (plane, [coarse, fine], levels, groups)));
+        }
+        tasks.into_par_iter().for_each(|(plane, mut out, levels, groups)| {
+            let mut sums = out.each_mut().map(|out| PlaneSums { sums: &mut out.sums, cells: &mut out.touched });
             for (points, by_features) in groups {
-                let mut sums = PlaneSums { sums, touched };
-                dispatch!(field.level, simd =>
-                    by_plane(simd, planes, [plane, level], *points, by_features, &mut sums));
+                dispatch!(field.level, simd => by_plane(simd, levels, plane, *points, by_features, &mut sums));
             }
+            let pairs = out.into_iter().zip(levels);
+            pairs.for_each(|(out, planes)| nodes_of_cells(&mut out.touched, planes.columns(plane)));
         });
     }
 }

@@ -12,6 +12,7 @@
 //! [`TriplaneField::distances`] tells where surfaces are, and [`write_field`] keeps the map.
 
 mod adam;
+mod cells;
 mod chunk;
 mod decode;
 mod decode_backward;
@@ -24,6 +25,7 @@ mod map_file;
 mod march;
 mod opacity;
 mod planes;
+mod prefetch;
 mod prepared;
 mod query;
 #[cfg(test)]
@@ -31,6 +33,7 @@ mod reference;
 mod region;
 mod render;
 mod sampling;
+mod scatter;
 mod settings;
 
 pub use adam::{FieldStep, TriplaneAdam};

@@ -3,9 +3,10 @@
 use fearless_simd::{Level, dispatch, f32x8, prelude::*};
 use nalgebra::Vector3;
 
+use super::cells::{PlanesView, Points};
 use super::decode::{Activations, decode};
 use super::decode_backward::{Transposed, decode_backward};
-use super::encode::{PlanesView, Points, by_points, encode};
+use super::encode::{by_points, encode};
 use super::field::TriplaneField;
 use super::layers::Layers;
 use super::opacity::{Opacity, opacity};
@@ -57,6 +58,12 @@ impl<const OUTPUTS: usize> FieldSamples<OUTPUTS> {
         self.points.iter_mut().zip(point).for_each(|(axis, x)| axis.push(x));
     }
 
+    pub(super) fn extend(&mut self, points: impl Iterator<Item = [f32; 3]> + Clone) {
+        for (axis, coordinates) in self.points.iter_mut().enumerate() {
+            coordinates.extend(points.clone().map(|point| point[axis]));
+        }
+    }
+
     pub(super) fn len(&self) -> usize {
         self.points[0].len()
     }
@@ -106,9 +113,8 @@ impl<'a, const OUTPUTS: usize> Head<'a, OUTPUTS> {
         let FieldSamples { activations, by_outputs, by_features, .. } = samples;
         decode_backward(simd, self.layers, &self.transposed, activations, by_outputs, by_features, by_layers);
         let count = samples.len();
-        samples.by_points.clear();
+        samples.by_points.resize(if with_points { count } else { 0 }, [0.0; 3]);
         if with_points {
-            samples.by_points.resize(count, [0.0; 3]);
             let points = samples.points.each_ref().map(Vec::as_slice);
             by_points(simd, &self.planes, points, &samples.by_features, &mut samples.by_points);
         }

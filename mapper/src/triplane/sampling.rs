@@ -120,8 +120,9 @@ impl<'a> MidDepth<'a> {
     /// Depth measured at a point of the camera frame of mid exposure, if any.
     fn at(&self, x: [f32; 3]) -> Option<f32> {
         let camera = &self.camera;
-        let u = (camera.fx as f32 * x[0] / x[2] + camera.cx as f32).round();
-        let v = (camera.fy as f32 * x[1] / x[2] + camera.cy as f32).round();
+        // Half a pixel more, so that cutting off rounds.
+        let u = camera.fx as f32 * x[0] / x[2] + camera.cx as f32 + 0.5;
+        let v = camera.fy as f32 * x[1] / x[2] + camera.cy as f32 + 0.5;
         let inside = u >= 0.0 && v >= 0.0 && u < camera.width as f32 && v < camera.height as f32;
         let pixel = if inside { v as usize * camera.width + u as usize } else { usize::MAX };
         self.depth.get(pixel).copied().filter(|depth| *depth > 0.0)

@@ -1,0 +1,134 @@
+//! Gradients by the values of planes.
+//!
+//! Samples of a ray lie next to each other, and often in one cell: the sums of its four nodes stay in registers until
+//! a sample of another cell comes. One pass over the samples serves both resolutions.
+
+use fearless_simd::{f32x8, prelude::*};
+
+use super::cells::{Cell, Cells, LANES, PlanesView, Points, TILE, tile, weights};
+use super::settings::{CHANNELS, FEATURES};
+
+/// Vectors per node.
+const VECTORS: usize = CHANNELS / LANES;
+
+/// No cell yet.
+const NOWHERE: usize = usize::MAX;
+
+/// Where the gradient by one plane goes.
+#[derive(Debug)]
+pub(super) struct PlaneSums<'a> {
+    /// A number per value of the plane.
+    pub(super) sums: &'a mut [f32],
+    /// A bit per cell, that of its node with the least coordinates: whether a gradient was added.
+    pub(super) cells: &'a mut [u64],
+}
+
+/// Sums of the four nodes of a cell.
+struct Corners<S: Simd> {
+    /// First float of the node with the least coordinates, or [`NOWHERE`].
+    start: usize,
+    sums: [[f32x8<S>; VECTORS]; 4],
+}
+
+impl<S: Simd> Corners<S> {
+    #[inline(always)]
+    fn at(simd: S, start: usize) -> Self {
+        Self { start, sums: [[f32x8::splat(simd, 0.0); VECTORS]; 4] }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, simd: S, gradient: &[f32], weights: [f32; 4]) {
+        for (k, gradient) in gradient.as_chunks::<LANES>().0.iter().enumerate() {
+            let gradient = f32x8::load_array_ref(simd, gradient);
+            for (sums, weight) in self.sums.iter_mut().zip(weights) {
+                sums[k] = gradient.mul_add(weight, sums[k]);
+            }
+        }
+    }
+
+    /// Adds the sums to those in memory.
+    #[inline(always)]
+    fn store(&self, simd: S, columns: usize, out: &mut PlaneSums<'_>) {
+        if self.start == NOWHERE {
+            return;
+        }
+        for (row, sums) in self.sums.as_chunks::<2>().0.iter().enumerate() {
+            let start = self.start + row * columns * CHANNELS;
+            let nodes = out.sums[start..start + 2 * CHANNELS].as_chunks_mut::<LANES>().0;
+            for (node, sum) in nodes.iter_mut().zip(sums.as_flattened()) {
+                (*sum + f32x8::load_array_ref(simd, node)).store_array(node);
+            }
+        }
+        let node = self.start / CHANNELS;
+        out.cells[node / 64] |= 1 << (node % 64);
+    }
+}
+
+/// Adds the gradient by the values of plane `plane` of both resolutions, the coarse and the fine one.
+#[inline(always)]
+pub(super) fn by_plane<S: Simd>(
+    simd: S,
+    levels: &[PlanesView<'_>; 2],
+    plane: usize,
+    points: Points<'_>,
+    by_features: &[[f32; FEATURES]],
+    out: &mut [PlaneSums<'_>; 2],
+) {
+    let columns = levels.each_ref().map(|planes| planes.columns(plane));
+    let mut cells = [Cells::NONE; 2];
+    let mut corners = [Corners::at(simd, NOWHERE), Corners::at(simd, NOWHERE)];
+    for start in (0..points[0].len()).step_by(TILE) {
+        let points = tile(points, start);
+        for (cells, planes) in cells.iter_mut().zip(levels) {
+            cells.find(simd, planes, points, [plane]);
+        }
+        cells[1].prefetch(out[1].sums, plane, columns[1], points[0].len());
+        let gradients = &by_features[start..start + points[0].len()];
+        for (point, gradient) in gradients.iter().take(TILE).enumerate() {
+            for level in 0..2 {
+                let Cell { start, place } = cells[level].at(point, plane);
+                if start != corners[level].start {
+                    corners[level].store(simd, columns[level], &mut out[level]);
+                    corners[level] = Corners::at(simd, start);
+                }
+                let gradient = &gradient[level * CHANNELS..(level + 1) * CHANNELS];
+                corners[level].add(simd, gradient, weights(place));
+            }
+        }
+    }
+    for level in 0..2 {
+        corners[level].store(simd, columns[level], &mut out[level]);
+    }
+}
+
+/// From the cells of a plane with `columns` nodes in a row to their nodes: a bit per node.
+pub(super) fn nodes_of_cells(bits: &mut [u64], columns: usize) {
+    for shift in [columns, 1] {
+        let (words, rest) = (shift / 64, shift % 64);
+        for word in (words..bits.len()).rev() {
+            let from = bits[word - words];
+            let carry = if rest > 0 && word > words { bits[word - words - 1] >> (64 - rest) } else { 0 };
+            bits[word] |= from << rest | carry;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cell_has_four_nodes() {
+        for columns in [2, 9, 63, 64, 65, 130] {
+            for cell in [0, 5, 62, 63, 64, 127] {
+                let mut bits = vec![0; (cell + columns + 2_usize).div_ceil(64)];
+                bits[cell / 64] |= 1 << (cell % 64);
+                nodes_of_cells(&mut bits, columns);
+                let set = (0..64 * bits.len()).filter(|node| bits[node / 64] >> (node % 64) & 1 == 1);
+                let mut nodes = vec![cell, cell + 1, cell + columns, cell + columns + 1];
+                nodes.dedup();
+                assert_eq!(set.collect::<Vec<_>>(), nodes, "{columns} columns");
+            }
+        }
+    }
+}

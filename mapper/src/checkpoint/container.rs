@@ -1,6 +1,5 @@
 //! The file: header, checksum, payload.
 
-use std::fs;
 use std::path::Path;
 
 use serde::Serialize;
@@ -8,8 +7,7 @@ use serde::de::DeserializeOwned;
 
 use super::identity::IDENTITY_LEN;
 use super::{CheckpointError, Identity};
-use crate::FileError;
-use crate::whole_file::write_durably;
+use crate::whole_file::{read, write_durably};
 
 /// What every checkpoint starts with.
 const MAGIC: [u8; 8] = *b"MBACKPT\n";
@@ -46,7 +44,7 @@ pub fn save(path: &Path, identity: &Identity, value: &impl Serialize) -> Result<
 /// # Errors
 /// All of [`CheckpointError`] but `Unencodable`; of several defects the one that explains the others.
 pub fn load<T: DeserializeOwned>(path: &Path, identity: &Identity) -> Result<T, CheckpointError> {
-    let bytes = fs::read(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let bytes = read(path)?;
     let content = |reason| CheckpointError::Content { path: path.to_owned(), reason };
     match postcard::take_from_bytes(payload(path, identity, &bytes)?) {
         Ok((value, [])) => Ok(value),
@@ -98,8 +96,11 @@ fn checksum(header: &[u8], payload: &[u8]) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::{Difference, Fingerprint, exact_floats};
     use super::*;
+    use crate::FileError;
     use crate::gaussians::{Gaussian, Gaussians};
 
     #[derive(Debug, serde::Serialize, serde::Deserialize)]

@@ -1,15 +1,14 @@
 //! Reading a field.
 
-use std::fs;
 use std::path::Path;
 
 use super::{CHECKED_FROM, FieldFileError, MAGIC, VERSION};
-use crate::FileError;
 use crate::triplane::field::TriplaneField;
 use crate::triplane::layers::Layers;
 use crate::triplane::planes::FeaturePlanes;
 use crate::triplane::region::{MOST_CELLS, Region};
 use crate::triplane::settings::{CHANNELS, FieldSettings, HIDDEN, MOST_REFINEMENT};
+use crate::whole_file::read;
 
 /// Bytes before the decoders.
 const HEADER_LEN: usize = 76;
@@ -23,7 +22,7 @@ const DECODERS_LEN: usize = 4 * (Layers::<1>::COUNT + Layers::<3>::COUNT);
 /// # Errors
 /// All of [`FieldFileError`]; of several defects the one that explains the others.
 pub fn read_field(path: &Path) -> Result<TriplaneField, FieldFileError> {
-    let bytes = fs::read(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let bytes = read(path)?;
     let mut file = Reader { path, bytes: &bytes };
     file.check_start()?;
     let header = file.header()?;

@@ -4,7 +4,6 @@ use mba_mapper::bundle::{
     BundleAdjustment, BundleSettings, FrameState, Keyframe, MapKind, ObservationPyramid, PathPrior, Sensor,
     StepReport,
 };
-use mba_mapper::dataset::RgbdFrame;
 use mba_mapper::exposure::ExposurePath;
 use mba_mapper::synth::{SynthConfig, SynthError, SynthFrame, SynthSequence};
 use mba_tracker::image::PixelRectangle;
@@ -85,7 +84,8 @@ impl BundleInput {
     }
 }
 
-fn sensor(sequence: &SynthSequence) -> Sensor {
+/// The camera of a synthetic sequence.
+pub(crate) fn sensor(sequence: &SynthSequence) -> Sensor {
     let camera = sequence.camera();
     Sensor {
         camera,
@@ -97,15 +97,6 @@ fn sensor(sequence: &SynthSequence) -> Sensor {
 
 fn keyframe(sensor: &Sensor, index: usize, frame: SynthFrame) -> Option<Keyframe> {
     let prior = PathPrior { middle: frame.world_from_camera, motion: None };
-    let captured = RgbdFrame {
-        index,
-        timestamp: frame.timestamp,
-        exposure_seconds: frame.exposure_seconds,
-        width: frame.width,
-        height: frame.height,
-        rgb: frame.rgb,
-        depth: frame.depth,
-    };
-    let observation = ObservationPyramid::new(sensor, &captured, 2)?;
+    let observation = ObservationPyramid::new(sensor, &frame.into_captured(index), 2)?;
     Some(Keyframe::new(index, observation, prior))
 }

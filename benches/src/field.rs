@@ -1,16 +1,15 @@
 //! A tri-plane field that has begun to take the shape of the synthetic room, and a frame to compare it with.
 
-use mba_mapper::bundle::{Exposure, ExposureLoss, Observation, ObservationPyramid, Sensor};
-use mba_mapper::dataset::RgbdFrame;
+use mba_mapper::bundle::{Exposure, ExposureLoss, Observation, ObservationPyramid};
 use mba_mapper::exposure::ExposurePath;
 use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence};
 use mba_mapper::triplane::{
     FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
     TriplaneEngine, TriplaneField,
 };
-use mba_tracker::image::PixelRectangle;
-use mba_tracker::photometric::InverseResponse;
 use mba_tracker::simd::Level;
+
+use crate::bundle::sensor;
 
 /// Pixels that are compared in a step.
 pub const PIXELS: usize = 1024;
@@ -37,21 +36,9 @@ impl FieldInput {
     pub fn room(level: Level) -> Result<Self, SynthError> {
         let config = SynthConfig { frames: 2, width: 320, height: 240, ..SynthConfig::default() };
         let sequence = SynthSequence::new(config)?;
-        let (camera, frame) = (sequence.camera(), sequence.render_frame(0));
-        let region = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
-        let inverse_response = InverseResponse::srgb();
-        let sensor = Sensor { camera, inverse_response, depth_scale: 5000.0, region };
+        let (sensor, frame) = (sensor(&sequence), sequence.render_frame(0));
         let path = ExposurePath::linear(frame.exposure);
-        let captured = RgbdFrame {
-            index: 0,
-            timestamp: frame.timestamp,
-            exposure_seconds: frame.exposure_seconds,
-            width: frame.width,
-            height: frame.height,
-            rgb: frame.rgb,
-            depth: frame.depth,
-        };
-        let pyramid = ObservationPyramid::new(&sensor, &captured, 1);
+        let pyramid = ObservationPyramid::new(&sensor, &frame.into_captured(0), 1);
         let seen = pyramid.expect("a frame has the size of its camera").level(0).clone();
         let field = TriplaneField::new(around(&seen, &path), FieldSettings::default(), 1);
         let mut input = Self { field, engine: TriplaneEngine::new(level, &sensor), seen, path };

@@ -14,6 +14,7 @@
 //! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
 //! results with the truth.
 
+mod binary_file;
 pub mod bundle;
 pub mod checkpoint;
 pub mod continuity;
@@ -43,4 +44,5 @@ pub mod trajectory_file;
 pub mod triplane;
 mod whole_file;
 
+pub use binary_file::BinaryFileError;
 pub use error::FileError;

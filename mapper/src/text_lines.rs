@@ -1,9 +1,9 @@
 //! Lines of a text file: comments, fields, finite numbers, timestamps in order.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::FileError;
+use crate::whole_file::read_text;
 
 /// A whole text file; lines that are blank or start with `#` are skipped but counted.
 pub(crate) struct TextFile {
@@ -23,10 +23,7 @@ pub(crate) struct Line<'a> {
 
 impl TextFile {
     pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
-        match fs::read_to_string(path) {
-            Ok(text) => Ok(Self { path: path.to_owned(), text }),
-            Err(reason) => Err(FileError::Unreadable { path: path.to_owned(), reason }),
-        }
+        Ok(Self { path: path.to_owned(), text: read_text(path)? })
     }
 
     pub(crate) fn lines(&self) -> impl Iterator<Item = Line<'_>> {

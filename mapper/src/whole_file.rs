@@ -1,10 +1,20 @@
-//! Files that appear whole or not at all.
+//! Files that are read at once, and appear whole or not at all.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::FileError;
+
+/// The content of a file.
+pub(crate) fn read(path: &Path) -> Result<Vec<u8>, FileError> {
+    fs::read(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })
+}
+
+/// The content of a text file in UTF-8.
+pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
+    fs::read_to_string(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })
+}
 
 /// Writes beside the file and renames, so that a full disk never leaves half a file.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), FileError> {

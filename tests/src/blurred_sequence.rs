@@ -38,6 +38,16 @@ impl BlurredSequence {
         Self { folder, dataset }
     }
 
+    /// Six small frames: big enough to map, too small to track.
+    ///
+    /// # Panics
+    /// When they cannot be rendered or written.
+    #[must_use]
+    pub fn tiny() -> Self {
+        let (frames, width, height) = (6, 64, 48);
+        Self::new(SynthConfig { frames, width, height, mean_blur_px: 3.0, ..SynthConfig::default() })
+    }
+
     /// Where something lies in the temporary folder.
     #[must_use]
     pub fn path(&self, relative: &str) -> PathBuf {

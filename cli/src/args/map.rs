@@ -78,17 +78,6 @@ pub enum Field {
     Triplane,
 }
 
-impl Field {
-    /// As on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Gaussians => "gaussians",
-            Self::Triplane => "triplane",
-        }
-    }
-}
-
 impl From<Field> for MapKind {
     fn from(field: Field) -> Self {
         match field {

@@ -5,11 +5,11 @@ use std::path::Path;
 use mba_mapper::checkpoint::CheckpointError;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
-use mba_mapper::run::{Run, RunCamera, RunSettings, Summary};
+use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
 use super::open;
-use crate::args::BlurMode;
+use super::written_run::{self, OUT_HINT, absolute, announce, name, or_auto};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
@@ -50,34 +50,22 @@ pub fn map_into(
     let mapped = map_dataset(dataset, run, &settings, out, resume, describe(dataset, run, args), observe);
     progress.finish_and_clear();
     let summary = mapped.or_else(advise)?;
-    for warning in &summary.warnings {
-        console.warning(warning);
-    }
-    console.note(format!("wrote {}", out.display()));
+    announce(&summary, out, console);
     Ok(summary)
 }
 
 fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
-    // The run may be looked at from another directory.
-    let absolute =
-        |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string();
     let values = json!({
-        "field": args.field.name(),
+        "field": name(&args.field),
         "trajectory": absolute(&run.folder),
-        "blur": if args.blur == BlurMode::Auto { "auto" } else { "off" },
-        "virtual_views": args.virtual_views.map_or_else(|| json!("auto"), |n| json!(n)),
+        "blur": name(&args.blur),
+        "virtual_views": or_auto(args.virtual_views),
         "max_keyframes": args.max_keyframes,
-        "max_gaussians": args.max_gaussians.map_or_else(|| json!("auto"), |n| json!(n)),
+        "max_gaussians": or_auto(args.max_gaussians),
         "time_budget_seconds": args.time_budget.map(|budget| budget.as_secs_f64()),
         "seed": args.seed,
     });
-    RunSettings {
-        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
-        dataset: absolute(dataset.folder()),
-        frame_rate: dataset.calibration().frame_rate,
-        camera: Some(RunCamera::from(dataset.calibration())),
-        options: values.as_object().cloned().unwrap_or_default(),
-    }
+    written_run::settings(dataset, &values)
 }
 
 /// Advice for what the user can repair.
@@ -100,7 +88,7 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
             "start without --resume, or with the inputs and options of the stopped run"
         }
         MapError::Continuity(_) => "track the data set again",
-        _ => "name a folder for --out that can be created or written",
+        _ => OUT_HINT,
     };
     Err(error).or_bad_input(hint)
 }

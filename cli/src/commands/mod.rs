@@ -15,3 +15,4 @@ pub mod report;
 pub mod slam;
 pub mod synth;
 pub mod track;
+pub mod written_run;

@@ -2,14 +2,14 @@
 
 use std::path::Path;
 
-use clap::ValueEnum;
 use mba_mapper::dataset::Dataset;
-use mba_mapper::run::{RunCamera, RunError, RunSettings, Summary};
+use mba_mapper::run::{RunError, RunSettings, Summary};
 use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::tracking::TrackingError;
 use serde_json::json;
 
 use super::open;
+use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, name, or_auto};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
@@ -54,44 +54,27 @@ pub fn slam_into(
     let finished = run_slam(dataset, &SlamSettings::from(args), out, describe(dataset, args), observe);
     progress.finish_and_clear();
     let summary = finished.or_else(advise)?;
-    for warning in &summary.warnings {
-        console.warning(warning);
-    }
-    console.note(format!("wrote {}", out.display()));
+    announce(&summary, out, console);
     Ok(summary)
 }
 
 fn describe(dataset: &Dataset, args: &Slamming) -> RunSettings {
-    // The run may be looked at from another directory.
-    let folder = dataset.folder().canonicalize().unwrap_or_else(|_| dataset.folder().to_owned());
-    let auto = |limit: Option<usize>| limit.map_or_else(|| json!("auto"), |limit| json!(limit));
     let on_off = |on: bool| if on { "on" } else { "off" };
     let settings = SlamSettings::from(args);
     let values = json!({
         "field": name(&args.field),
         "realtime": args.realtime,
         "blur": name(&args.ablation.blur),
-        "virtual_views": auto(settings.virtual_views),
+        "virtual_views": or_auto(settings.virtual_views),
         "reference": name(&args.ablation.reference),
         "depth_term": on_off(settings.depth_term),
         "loop": on_off(settings.loops),
         "max_keyframes": settings.max_keyframes,
-        "max_gaussians": auto(settings.max_gaussians),
+        "max_gaussians": or_auto(settings.max_gaussians),
         "time_budget_seconds": settings.time_budget.map(|budget| budget.as_secs_f64()),
         "seed": settings.seed,
     });
-    RunSettings {
-        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
-        dataset: folder.display().to_string(),
-        frame_rate: dataset.calibration().frame_rate,
-        camera: Some(RunCamera::from(dataset.calibration())),
-        options: values.as_object().cloned().unwrap_or_default(),
-    }
-}
-
-/// The name of a value on the command line.
-fn name(value: &impl ValueEnum) -> String {
-    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    written_run::settings(dataset, &values)
 }
 
 /// Advice for what the user can repair.
@@ -105,12 +88,8 @@ fn advise(error: SlamError) -> anyhow::Result<Summary> {
         return Err(error.into());
     }
     let hint = match &error {
-        SlamError::Tracking(TrackingError::Camera(_)) => {
-            "check the calibration: the tracker needs at least 32 x 32 pixels"
-        }
-        SlamError::Run(RunError::Unwritable { .. }) => {
-            "name a folder for --out that can be created or written"
-        }
+        SlamError::Tracking(TrackingError::Camera(_)) => CAMERA_HINT,
+        SlamError::Run(RunError::Unwritable { .. }) => OUT_HINT,
         SlamError::Map(_) => "a map needs frames with depth that can be tracked; see `mba info DATASET`",
         _ => "see `mba info DATASET`",
     };

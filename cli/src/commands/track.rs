@@ -4,11 +4,12 @@ use std::path::Path;
 
 use mba_mapper::dataset::Dataset;
 use mba_mapper::deblurring::write_deblurred_keyframes;
-use mba_mapper::run::{Merit, RunCamera, RunError, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
 use super::open;
+use super::written_run::{self, CAMERA_HINT, OUT_HINT, note_written, or_auto};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;
 use crate::failure::OrBadInput;
@@ -44,7 +45,7 @@ pub fn track_into(
     progress.finish_and_clear();
     match tracked {
         Err(TrackingError::Camera(error)) => {
-            Err(error).or_bad_input("check the calibration: the tracker needs at least 32 x 32 pixels")?;
+            Err(error).or_bad_input(CAMERA_HINT)?;
         }
         other => other?,
     }
@@ -61,7 +62,7 @@ pub fn track_into(
         let reason = first.map_or("see summary.json", String::as_str);
         console.warning(format!("{} frames were skipped, the first: {reason}", summary.frames.skipped));
     }
-    console.note(format!("wrote {}", out.display()));
+    note_written(out, console);
     Ok(summary)
 }
 
@@ -79,29 +80,21 @@ fn deblur_keyframes(
 }
 
 fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
-    // The run may be looked at from another directory.
-    let folder = dataset.folder().canonicalize().unwrap_or_else(|_| dataset.folder().to_owned());
     let options = TrackingOptions::from(args);
     let values = json!({
         "blur": if options.blur { "auto" } else { "off" },
-        "virtual_views": options.virtual_views.map_or_else(|| json!("auto"), |n| json!(n)),
+        "virtual_views": or_auto(options.virtual_views),
         "reference": format!("{:?}", options.reference).to_lowercase(),
         "tracker_memory_bytes": tracker_config(dataset, &options).workspace_len(),
         "depth_term": if args.depth_term == Switch::On { "on" } else { "off" },
     });
-    RunSettings {
-        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
-        dataset: folder.display().to_string(),
-        frame_rate: dataset.calibration().frame_rate,
-        camera: Some(RunCamera::from(dataset.calibration())),
-        options: values.as_object().cloned().unwrap_or_default(),
-    }
+    written_run::settings(dataset, &values)
 }
 
 /// An output that cannot be written from the start is wrong use; a full disk is not.
 fn advise_output(error: RunError) -> anyhow::Result<RunWriter> {
     match error {
         RunError::DiskFull { .. } => Err(error.into()),
-        _ => Err(error).or_bad_input("name a folder for --out that can be created or written"),
+        _ => Err(error).or_bad_input(OUT_HINT),
     }
 }

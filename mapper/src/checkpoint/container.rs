@@ -1,6 +1,5 @@
 //! The file: header, checksum, payload.
 
-use std::fs;
 use std::path::Path;
 
 use serde::Serialize;
@@ -8,8 +7,9 @@ use serde::de::DeserializeOwned;
 
 use super::identity::IDENTITY_LEN;
 use super::{CheckpointError, Identity};
-use crate::FileError;
-use crate::whole_file::write_durably;
+use crate::BinaryFileError;
+use crate::binary_file::{check_checksum, check_length, check_version};
+use crate::whole_file::{read, write_durably};
 
 /// What every checkpoint starts with.
 const MAGIC: [u8; 8] = *b"MBACKPT\n";
@@ -46,7 +46,7 @@ pub fn save(path: &Path, identity: &Identity, value: &impl Serialize) -> Result<
 /// # Errors
 /// All of [`CheckpointError`] but `Unencodable`; of several defects the one that explains the others.
 pub fn load<T: DeserializeOwned>(path: &Path, identity: &Identity) -> Result<T, CheckpointError> {
-    let bytes = fs::read(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let bytes = read(path)?;
     let content = |reason| CheckpointError::Content { path: path.to_owned(), reason };
     match postcard::take_from_bytes(payload(path, identity, &bytes)?) {
         Ok((value, [])) => Ok(value),
@@ -57,29 +57,21 @@ pub fn load<T: DeserializeOwned>(path: &Path, identity: &Identity) -> Result<T, 
 
 /// The payload of a whole checkpoint of the run `identity`.
 fn payload<'a>(path: &Path, identity: &Identity, bytes: &'a [u8]) -> Result<&'a [u8], CheckpointError> {
-    let path = path.to_owned();
     let found = bytes.len() as u64;
     if !bytes.starts_with(&MAGIC[..MAGIC.len().min(bytes.len())]) {
-        return Err(CheckpointError::NotACheckpoint { path });
+        return Err(CheckpointError::NotACheckpoint { path: path.to_owned() });
     }
     let Some((header, payload)) = bytes.split_first_chunk::<HEADER_LEN>() else {
-        return Err(CheckpointError::Length { path, expected: HEADER_LEN as u64, found });
+        let (path, expected) = (path.to_owned(), HEADER_LEN as u64);
+        return Err(BinaryFileError::Length { path, expected, found }.into());
     };
-    let version = u32::from_le_bytes(field(header, VERSION_AT));
-    if version != VERSION {
-        return Err(CheckpointError::Version { path, found: version, expected: VERSION });
-    }
+    check_version(path, "the checkpoint layout", VERSION, u32::from_le_bytes(field(header, VERSION_AT)))?;
     let expected = u64::from_le_bytes(field(header, LENGTH_AT)).saturating_add(HEADER_LEN as u64);
-    if found != expected {
-        return Err(CheckpointError::Length { path, expected, found });
-    }
+    check_length(path, expected, found)?;
     let expected = u32::from_le_bytes(field(header, CHECKSUM_AT));
-    let found = checksum(&header[IDENTITY_AT..CHECKSUM_AT], payload);
-    if found != expected {
-        return Err(CheckpointError::Damaged { path, expected, found });
-    }
+    check_checksum(path, expected, checksum(&header[IDENTITY_AT..CHECKSUM_AT], payload))?;
     match identity.difference(&field(header, IDENTITY_AT)) {
-        Some(difference) => Err(CheckpointError::Foreign { path, difference }),
+        Some(difference) => Err(CheckpointError::Foreign { path: path.to_owned(), difference }),
         None => Ok(payload),
     }
 }
@@ -98,8 +90,11 @@ fn checksum(header: &[u8], payload: &[u8]) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::{Difference, Fingerprint, exact_floats};
     use super::*;
+    use crate::FileError;
     use crate::gaussians::{Gaussian, Gaussians};
 
     #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -155,13 +150,14 @@ mod tests {
         for length in 0..bytes.len() {
             let error = refusal(&path, &bytes[..length]);
             let expected = if length < HEADER_LEN { HEADER_LEN } else { bytes.len() } as u64;
-            let CheckpointError::Length { expected: announced, found, .. } = error else {
+            let CheckpointError::Unsound(BinaryFileError::Length { expected: announced, found, .. }) = error
+            else {
                 panic!("{length} bytes: {error}")
             };
             assert_eq!((announced, found), (expected, length as u64));
         }
         let longer = [&bytes[..], &[0]].concat();
-        assert!(matches!(refusal(&path, &longer), CheckpointError::Length { .. }));
+        assert!(matches!(refusal(&path, &longer), CheckpointError::Unsound(BinaryFileError::Length { .. })));
     }
 
     #[test]
@@ -171,11 +167,14 @@ mod tests {
             let mut damaged = bytes.clone();
             damaged[at] ^= 0x10;
             let error = refusal(&path, &damaged);
+            use CheckpointError::{NotACheckpoint, Unsound};
             let right = match at {
-                ..VERSION_AT => matches!(error, CheckpointError::NotACheckpoint { .. }),
-                VERSION_AT..IDENTITY_AT => matches!(error, CheckpointError::Version { expected: 1, .. }),
-                LENGTH_AT..CHECKSUM_AT => matches!(error, CheckpointError::Length { .. }),
-                _ => matches!(error, CheckpointError::Damaged { .. }),
+                ..VERSION_AT => matches!(error, NotACheckpoint { .. }),
+                VERSION_AT..IDENTITY_AT => {
+                    matches!(error, Unsound(BinaryFileError::Version { expected: 1, .. }))
+                }
+                LENGTH_AT..CHECKSUM_AT => matches!(error, Unsound(BinaryFileError::Length { .. })),
+                _ => matches!(error, Unsound(BinaryFileError::Damaged { .. })),
             };
             assert!(right, "byte {at}: {error}");
         }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::Difference;
-use crate::FileError;
+use crate::{BinaryFileError, FileError};
 
 /// A checkpoint cannot be written or is not fit to go on from.
 #[derive(Debug, thiserror::Error)]
@@ -26,36 +26,9 @@ pub enum CheckpointError {
         /// The file.
         path: PathBuf,
     },
-    /// The layout is that of another version.
-    #[error("{path} has version {found} of the checkpoint layout, this program reads version {expected}")]
-    Version {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Version in the file.
-        found: u32,
-        /// The version that can be read.
-        expected: u32,
-    },
-    /// The file is shorter or longer than it should be.
-    #[error("{path} should have {expected} bytes and has {found}: it was cut or something was added")]
-    Length {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Bytes that the header announces; for a cut header those of a header.
-        expected: u64,
-        /// Bytes in the file.
-        found: u64,
-    },
-    /// The checksum is wrong.
-    #[error("{path} is damaged: its checksum is {found:08x}, expected {expected:08x}")]
-    Damaged {
-        /// The checkpoint.
-        path: PathBuf,
-        /// Checksum in the file.
-        expected: u32,
-        /// Checksum of the content.
-        found: u32,
-    },
+    /// The file was cut or changed, or has the layout of another version.
+    #[error(transparent)]
+    Unsound(#[from] BinaryFileError),
     /// The checkpoint is whole but belongs to another run.
     #[error("{path} is a checkpoint {difference}")]
     Foreign {

@@ -1,6 +1,5 @@
 //! `calibration.toml`: the camera of one data set.
 
-use std::fs;
 use std::ops::Range;
 use std::path::Path;
 
@@ -12,6 +11,7 @@ use super::calibration::{ASSUMED_EXPOSURE_SHARE, InvalidValue};
 use super::{Calibration, DatasetError, ExposureSource, Readout, Response, Warning};
 use crate::FileError;
 use crate::text_lines::TextFile;
+use crate::whole_file::read_text;
 
 /// Name of the file.
 pub(super) const FILE_NAME: &str = "calibration.toml";
@@ -51,8 +51,7 @@ pub(super) fn read(
     measured_rate: Option<f64>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Calibration, DatasetError> {
-    let text =
-        fs::read_to_string(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let text = read_text(path)?;
     let keys: Keys = toml::from_str(&text).map_err(|error| DatasetError::CalibrationSyntax {
         path: path.to_owned(),
         line: line_of(&text, error.span()),

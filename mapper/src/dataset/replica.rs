@@ -2,7 +2,6 @@
 //! `results/depth000000.png`, one 4x4 camera-to-world matrix per line of `traj.txt`, and `cam_params.json` in
 //! the folder or the one above.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
@@ -17,6 +16,7 @@ use super::{
 };
 use crate::FileError;
 use crate::text_lines::TextFile;
+use crate::whole_file::read_text;
 
 const TRAJECTORY: &str = "traj.txt";
 const IMAGES: &str = "results";
@@ -81,8 +81,7 @@ fn camera_path(folder: &Path) -> PathBuf {
 }
 
 fn read_camera(path: &Path) -> Result<Calibration, DatasetError> {
-    let text =
-        fs::read_to_string(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let text = read_text(path)?;
     let CameraFile { camera } = serde_json::from_str(&text).map_err(|error| {
         let message = error.to_string();
         DatasetError::CalibrationSyntax {

@@ -207,7 +207,7 @@ fn median_measured(values: &[f32]) -> f32 {
 mod tests {
     use super::*;
     use crate::evaluation::psnr;
-    use crate::synth::{SynthConfig, SynthFrame, SynthSequence};
+    use crate::synth::{SynthConfig, SynthSequence};
 
     fn sequence() -> SynthSequence {
         let config =
@@ -220,18 +220,13 @@ mod tests {
         KeyframeDeblurrer::new(&config, SimdLevel::new())
     }
 
-    fn captured(frame: SynthFrame) -> RgbdFrame {
-        let SynthFrame { timestamp, exposure_seconds, width, height, rgb, depth, .. } = frame;
-        RgbdFrame { index: 0, timestamp, exposure_seconds, width, height, rgb, depth }
-    }
-
     #[test]
     fn the_true_motion_brings_the_image_nearer_to_the_truth() {
         let sequence = sequence();
         let deblurrer = deblurrer(&sequence);
         let mut memory = deblurrer.memory();
         for index in 0..sequence.len() {
-            let frame = captured(sequence.render_frame(index));
+            let frame = sequence.render_frame(index).into_captured(0);
             let deblurred = deblurrer.deblur(&frame, &sequence.exposure(index), &mut memory).unwrap();
             let truth = sequence.render_sharp(index);
             let [before, after] = [&frame.rgb, &deblurred.rgb].map(|image| psnr(&truth, image).unwrap());
@@ -245,7 +240,7 @@ mod tests {
     #[test]
     fn pixels_without_data_stay_black_and_cast_no_rings() {
         let sequence = sequence();
-        let mut frame = captured(sequence.render_frame(0));
+        let mut frame = sequence.render_frame(0).into_captured(0);
         let grey = frame.rgb.iter_mut().enumerate();
         grey.for_each(|(k, byte)| *byte = if k / 3 % 160 < 10 { 0 } else { 150 });
         let region = PixelRectangle { left: 10, top: 0, right: 160, bottom: 120 };
@@ -258,7 +253,7 @@ mod tests {
     fn without_motion_the_image_stays_as_it_is() {
         let sequence = sequence();
         let deblurrer = deblurrer(&sequence);
-        let frame = captured(sequence.render_frame(0));
+        let frame = sequence.render_frame(0).into_captured(0);
         let still = ExposureTrajectory::still(sequence.exposure(0).mid());
         let deblurred = deblurrer.deblur(&frame, &still, &mut deblurrer.memory()).unwrap();
         assert_eq!(deblurred, Deblurred { rgb: frame.rgb, sharpened: false });
@@ -271,7 +266,7 @@ mod tests {
         let still = ExposureTrajectory::still(sequence.exposure(0).mid());
         let refused =
             |frame: &RgbdFrame| deblurrer.deblur(frame, &still, &mut deblurrer.memory()).unwrap_err();
-        let good = captured(sequence.render_frame(0));
+        let good = sequence.render_frame(0).into_captured(0);
         let narrow = RgbdFrame { width: 159, ..good.clone() };
         assert!(matches!(refused(&narrow), DeblurError::Size { found: (159, 120), expected: (160, 120) }));
         let cut = RgbdFrame { rgb: good.rgb[1..].to_vec(), ..good.clone() };

@@ -1,28 +1,16 @@
 //! What can be wrong with a PLY file.
 
-use std::io;
 use std::path::PathBuf;
 
-/// A PLY file cannot be read or written.
+use crate::FileError;
+
+/// A PLY file cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlyError {
-    /// The file cannot be read.
-    #[error("cannot read {path}: {reason}")]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        reason: io::Error,
-    },
-    /// The file cannot be written; an older version of it is still there.
-    #[error("cannot write {path}: {reason}")]
-    Unwritable {
-        /// The file.
-        path: PathBuf,
-        /// What the operating system says.
-        reason: io::Error,
-    },
+    /// The file cannot be opened.
+    #[error(transparent)]
+    File(#[from] FileError),
     /// The file does not start like a PLY file.
     #[error("{path} is not a PLY file: its first line is not \"ply\"")]
     NotPly {

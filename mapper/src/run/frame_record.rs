@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use crate::FileError;
+use crate::whole_file::read_text;
 
 /// How far a frame's pose can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,8 +87,7 @@ pub(super) fn format_frames(frames: &[FrameRecord]) -> String {
 
 /// Reads the table; columns are found by name.
 pub(super) fn read_frames(path: &Path) -> Result<Vec<FrameRecord>, RunError> {
-    let text = std::fs::read_to_string(path)
-        .map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let text = read_text(path)?;
     let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text.as_bytes());
     reader.deserialize().map(|row| row.map_err(|error| malformed(path, &error))).collect()
 }

@@ -1,12 +1,11 @@
 //! Reading a RUN folder.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE};
 use super::{FrameRecord, RunError, Summary, frame_record};
-use crate::FileError;
 use crate::trajectory_file::{TimedExposure, read_exposures};
+use crate::whole_file::read_text;
 
 /// A run as its folder tells it.
 #[derive(Clone, Debug)]
@@ -31,8 +30,7 @@ impl Run {
         if !path.is_file() {
             return Err(RunError::NotARun { folder: folder.to_owned(), missing: SUMMARY_FILE });
         }
-        let json = fs::read_to_string(&path)
-            .map_err(|reason| FileError::Unreadable { path: path.clone(), reason })?;
+        let json = read_text(&path)?;
         let malformed = |message| RunError::MalformedSummary { path: path.clone(), message };
         let summary: Summary = serde_json::from_str(&json).map_err(|error| malformed(error.to_string()))?;
         if let Some(camera) = &summary.settings.camera {
@@ -49,6 +47,8 @@ impl Run {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::super::{RunCamera, RunSettings, RunWriter};
     use super::*;
 

@@ -12,7 +12,7 @@ use super::{
     CHECKPOINT_FILE, EXPOSURES_FILE, FIELD_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE,
 };
 use super::{FrameRecord, FrameStatus, RunError, RunSettings, StoredMap, Summary, frame_record};
-use crate::gaussians::format_ply;
+use crate::gaussians::write_ply;
 use crate::rendering::Scene;
 use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use crate::triplane::write_field;
@@ -153,8 +153,7 @@ impl RunWriter {
     pub fn write_map<'a>(&self, map: impl Into<Scene<'a>>) -> Result<(), RunError> {
         let other = match map.into() {
             Scene::Gaussians(map) => {
-                write_together(&[(self.folder.join(MAP_FILE), format_ply(map))])
-                    .map_err(RunError::from_write)?;
+                write_ply(&self.folder.join(MAP_FILE), map).map_err(RunError::from_write)?;
                 FIELD_FILE
             }
             Scene::Field(map) => {

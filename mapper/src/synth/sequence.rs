@@ -11,6 +11,7 @@ use super::render::{self, Size, SubFrame, TURNED_GRID};
 use super::scene::Scene;
 use super::view::View;
 use super::{CameraMotion, SynthConfig, SynthError};
+use crate::dataset::RgbdFrame;
 use crate::trajectory_file::TimedPose;
 
 /// Mid exposure of the first frame, seconds.
@@ -58,6 +59,15 @@ pub struct SynthFrame {
     pub blur: BlurFigure,
     /// Number of sub-frames that were averaged.
     pub sub_frames: usize,
+}
+
+impl SynthFrame {
+    /// What a camera delivers of it, as frame `index` of a data set.
+    #[must_use]
+    pub fn into_captured(self, index: usize) -> RgbdFrame {
+        let Self { timestamp, exposure_seconds, width, height, rgb, depth, .. } = self;
+        RgbdFrame { index, timestamp, exposure_seconds, width, height, rgb, depth }
+    }
 }
 
 impl SynthSequence {

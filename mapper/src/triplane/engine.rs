@@ -212,6 +212,19 @@ mod tests {
         ExposurePath::linear(ExposureTrajectory { start: pose(-0.03), end: pose(0.03) })
     }
 
+    /// A hundred pixels of an exposure, with all gradients.
+    fn drawn(exposure: Exposure<'_>) -> FieldExposure<'_> {
+        FieldExposure {
+            exposure,
+            pixels: 100,
+            weights: FieldWeights::default(),
+            sampling: SamplingSettings::default(),
+            with_path: true,
+            seed: 3,
+            step: 9,
+        }
+    }
+
     fn evaluated(
         level: Level,
         field: &TriplaneField,
@@ -220,18 +233,8 @@ mod tests {
         views: usize,
     ) -> (ExposureLoss, FieldGradients) {
         let seen = observation();
-        let exposure = Exposure { seen: &seen, path, gain, views };
         let mut engine = TriplaneEngine::new(level, &sensor());
-        let given = FieldExposure {
-            exposure,
-            pixels: 100,
-            weights: FieldWeights::default(),
-            sampling: SamplingSettings::default(),
-            with_path: true,
-            seed: 3,
-            step: 9,
-        };
-        let loss = engine.evaluate(field, &given);
+        let loss = engine.evaluate(field, &drawn(Exposure { seen: &seen, path, gain, views }));
         (loss, engine.gradients().clone())
     }
 
@@ -358,16 +361,7 @@ mod tests {
         let mut seen = observation();
         seen.region.right = 0;
         let exposure = Exposure { seen: &seen, path: &path(), gain: 1.0, views: 3 };
-        let given = FieldExposure {
-            exposure,
-            pixels: 100,
-            weights: FieldWeights::default(),
-            sampling: SamplingSettings::default(),
-            with_path: true,
-            seed: 3,
-            step: 9,
-        };
-        let loss = TriplaneEngine::new(Level::new(), &sensor()).evaluate(&lively_field(), &given);
+        let loss = TriplaneEngine::new(Level::new(), &sensor()).evaluate(&lively_field(), &drawn(exposure));
         assert_eq!((loss.terms.total(), loss.by_log_gain), (0.0, 0.0));
     }
 }

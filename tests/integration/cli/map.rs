@@ -10,21 +10,14 @@ use std::time::{Duration, Instant};
 
 use mba_mapper::evaluation::psnr;
 use mba_mapper::run::Run;
-use mba_mapper::synth::SynthConfig;
 use mba_tests::blurred_sequence::{BlurredSequence, assert_same_map, bytes, names};
 use mba_tests::small_dataset::FRAMES;
 
 use super::{Outcome, Workplace, mba};
 
-/// A tiny blurred sequence with its true poses in `run`: big enough to map, too small to track.
+/// A tiny sequence with its true poses in `run`.
 fn sequence() -> BlurredSequence {
-    let sequence = BlurredSequence::new(SynthConfig {
-        frames: 6,
-        width: 64,
-        height: 48,
-        mean_blur_px: 3.0,
-        ..SynthConfig::default()
-    });
+    let sequence = BlurredSequence::tiny();
     let _ = sequence.run_of("run", sequence.truth());
     sequence
 }

@@ -114,13 +114,7 @@ fn depth_maps_are_those_of_the_data_set() {
 
 #[test]
 fn the_map_does_not_depend_on_the_number_of_threads() {
-    let sequence = BlurredSequence::new(SynthConfig {
-        frames: 6,
-        width: 64,
-        height: 48,
-        mean_blur_px: 3.0,
-        ..SynthConfig::default()
-    });
+    let sequence = BlurredSequence::tiny();
     let run = sequence.run_of("run", sequence.truth());
     for (threads, out) in [(1, "one"), (2, "two")] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -1,12 +1,12 @@
 //! Reading, whatever the order of the properties.
 
-use std::fs;
 use std::path::Path;
 
 use super::NAMES;
 use crate::gaussians::display_colour::linear_of;
 use crate::gaussians::store::{COLOUR, Gaussian, Gaussians, PARAMETERS};
 use crate::ply::{Element, Header, PlyError, Records};
+use crate::whole_file::read;
 
 /// Reads a file of Gaussians, ascii or little-endian; see [`parse_ply`].
 ///
@@ -14,8 +14,7 @@ use crate::ply::{Element, Header, PlyError, Records};
 ///
 /// If the file cannot be read or is not a file of Gaussians.
 pub fn read_ply(path: &Path) -> Result<Gaussians, PlyError> {
-    let bytes = fs::read(path).map_err(|reason| PlyError::Unreadable { path: path.to_owned(), reason })?;
-    parse_ply(path, &bytes)
+    parse_ply(path, &read(path)?)
 }
 
 /// The Gaussians of a file with the content `bytes`; `path` only names it in errors.

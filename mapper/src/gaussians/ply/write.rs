@@ -1,11 +1,11 @@
 //! Writing, in the order of properties that all viewers know.
 
-use std::fs;
 use std::path::Path;
 
+use crate::FileError;
 use crate::gaussians::display_colour::coefficient_of;
 use crate::gaussians::store::{Gaussian, Gaussians};
-use crate::ply::PlyError;
+use crate::whole_file::write_together;
 
 /// Properties in the order of the original implementation. Normals are always zero; some viewers insist on them.
 const PROPERTIES: [&str; 17] = [
@@ -18,14 +18,9 @@ const PROPERTIES: [&str; 17] = [
 ///
 /// # Errors
 ///
-/// If the file cannot be written.
-pub fn write_ply(path: &Path, gaussians: &Gaussians) -> Result<(), PlyError> {
-    let partial = path.with_added_extension("partial");
-    fs::write(&partial, format_ply(gaussians)).and_then(|()| fs::rename(&partial, path)).map_err(|reason| {
-        // What is left of the partial file is of no use, and the first error is the one to report.
-        let _ = fs::remove_file(&partial);
-        PlyError::Unwritable { path: path.to_owned(), reason }
-    })
+/// [`FileError::Unwritable`].
+pub fn write_ply(path: &Path, gaussians: &Gaussians) -> Result<(), FileError> {
+    write_together(&[(path.to_owned(), format_ply(gaussians))])
 }
 
 /// The content of a file of Gaussians: little-endian, display colours, unit quaternions.

@@ -1,10 +1,10 @@
 //! Reading, whatever else the file has.
 
-use std::fs;
 use std::path::Path;
 
 use crate::ply::{Element, Header, PlyError, Records};
 use crate::surfaces::Mesh;
+use crate::whole_file::read;
 
 /// Names of the list of a face's corners; writers disagree.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -14,8 +14,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// # Errors
 /// If the file cannot be read or is not such a file.
 pub fn read_mesh(path: &Path) -> Result<Mesh, PlyError> {
-    let bytes = fs::read(path).map_err(|reason| PlyError::Unreadable { path: path.to_owned(), reason })?;
-    parse_mesh(path, &bytes)
+    parse_mesh(path, &read(path)?)
 }
 
 /// The mesh of a file with the content `bytes`; `path` only names it in errors.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::FileError;
+use crate::{BinaryFileError, FileError};
 
 /// A map file of a field cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -17,36 +17,9 @@ pub enum FieldFileError {
         /// The file.
         path: PathBuf,
     },
-    /// The layout is that of another version.
-    #[error("{path} has version {found} of the layout of fields, this program reads version {expected}")]
-    Version {
-        /// The file.
-        path: PathBuf,
-        /// Version in the file.
-        found: u32,
-        /// The version that can be read.
-        expected: u32,
-    },
-    /// The file is shorter or longer than its header says.
-    #[error("{path} should have {expected} bytes and has {found}: it was cut or something was added")]
-    Length {
-        /// The file.
-        path: PathBuf,
-        /// Bytes that the header announces; for a cut header those of a header.
-        expected: u64,
-        /// Bytes in the file.
-        found: u64,
-    },
-    /// The checksum is wrong.
-    #[error("{path} is damaged: its checksum is {found:08x}, expected {expected:08x}")]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// Checksum in the file.
-        expected: u32,
-        /// Checksum of the content.
-        found: u32,
-    },
+    /// The file was cut or changed, or has the layout of another version.
+    #[error(transparent)]
+    Unsound(#[from] BinaryFileError),
     /// A value of the header is out of range.
     #[error("{path}: {field} is {value}, expected {expected}")]
     Header {

@@ -53,6 +53,7 @@ mod tests {
     use std::path::PathBuf;
 
     use super::*;
+    use crate::BinaryFileError;
     use crate::triplane::TriplaneField;
     use crate::triplane::reference::lively_field;
 
@@ -104,8 +105,8 @@ mod tests {
             let error = read_field(&path).unwrap_err();
             let fits = match at {
                 0..8 => matches!(error, FieldFileError::NotAField { .. }),
-                8..12 => matches!(error, FieldFileError::Version { .. }),
-                _ => matches!(error, FieldFileError::Damaged { .. }),
+                8..12 => matches!(error, FieldFileError::Unsound(BinaryFileError::Version { .. })),
+                _ => matches!(error, FieldFileError::Unsound(BinaryFileError::Damaged { .. })),
             };
             assert!(fits, "byte {at}: {error}");
         }
@@ -126,7 +127,8 @@ mod tests {
             fs::write(&path, &*bytes).unwrap();
             read_field(&path).unwrap_err()
         };
-        assert!(matches!(set(&mut bytes.clone(), 64, 512), FieldFileError::Length { .. }));
+        let cut = set(&mut bytes.clone(), 64, 512);
+        assert!(matches!(cut, FieldFileError::Unsound(BinaryFileError::Length { .. })));
         assert!(matches!(set(&mut bytes.clone(), 64, 1 << 31), FieldFileError::Header { .. }));
         assert!(matches!(set(&mut bytes.clone(), 28, 0), FieldFileError::Header { .. }));
         assert!(matches!(set(&mut bytes.clone(), 32, f32::NAN.to_bits()), FieldFileError::Header { .. }));

@@ -1,15 +1,16 @@
 //! Reading a field.
 
-use std::fs;
 use std::path::Path;
 
 use super::{CHECKED_FROM, FieldFileError, MAGIC, VERSION};
-use crate::FileError;
+use crate::BinaryFileError;
+use crate::binary_file::{check_checksum, check_length, check_version};
 use crate::triplane::field::TriplaneField;
 use crate::triplane::layers::Layers;
 use crate::triplane::planes::FeaturePlanes;
 use crate::triplane::region::{MOST_CELLS, Region};
 use crate::triplane::settings::{CHANNELS, FieldSettings, HIDDEN, MOST_REFINEMENT};
+use crate::whole_file::read;
 
 /// Bytes before the decoders.
 const HEADER_LEN: usize = 76;
@@ -23,7 +24,7 @@ const DECODERS_LEN: usize = 4 * (Layers::<1>::COUNT + Layers::<3>::COUNT);
 /// # Errors
 /// All of [`FieldFileError`]; of several defects the one that explains the others.
 pub fn read_field(path: &Path) -> Result<TriplaneField, FieldFileError> {
-    let bytes = fs::read(path).map_err(|reason| FileError::Unreadable { path: path.to_owned(), reason })?;
+    let bytes = read(path)?;
     let mut file = Reader { path, bytes: &bytes };
     file.check_start()?;
     let header = file.header()?;
@@ -65,23 +66,16 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// Checks everything that needs no understanding of the content.
     fn check_start(&self) -> Result<(), FieldFileError> {
-        let (path, bytes) = (self.path.to_owned(), self.bytes);
+        let (path, bytes) = (self.path, self.bytes);
         if !bytes.starts_with(&MAGIC[..MAGIC.len().min(bytes.len())]) || bytes.is_empty() {
-            return Err(FieldFileError::NotAField { path });
+            return Err(FieldFileError::NotAField { path: path.to_owned() });
         }
         if bytes.len() < HEADER_LEN {
             let (expected, found) = (HEADER_LEN as u64, bytes.len() as u64);
-            return Err(FieldFileError::Length { path, expected, found });
+            return Err(BinaryFileError::Length { path: path.to_owned(), expected, found }.into());
         }
-        let found = self.u32_at(8);
-        if found != VERSION {
-            return Err(FieldFileError::Version { path, found, expected: VERSION });
-        }
-        let (expected, found) = (self.u32_at(12), crc32fast::hash(&bytes[CHECKED_FROM..]));
-        if expected != found {
-            return Err(FieldFileError::Damaged { path, expected, found });
-        }
-        Ok(())
+        check_version(path, "the layout of fields", VERSION, self.u32_at(8))?;
+        Ok(check_checksum(path, self.u32_at(12), crc32fast::hash(&bytes[CHECKED_FROM..]))?)
     }
 
     /// The four bytes at a place inside of the header.
@@ -163,11 +157,7 @@ impl Reader<'_> {
         };
         let planes = 2 * plane(1) + plane(settings.geometry_cells) + plane(settings.colour_cells);
         let expected = (HEADER_LEN + DECODERS_LEN) as u64 + planes;
-        let found = self.bytes.len() as u64;
-        if expected == found {
-            return Ok(());
-        }
-        Err(FieldFileError::Length { path: self.path.to_owned(), expected, found })
+        Ok(check_length(self.path, expected, self.bytes.len() as u64)?)
     }
 
     /// The next four bytes as a number; the length was checked.

@@ -1,0 +1,60 @@
+//! What the commands that write a RUN folder have in common.
+
+use std::path::Path;
+
+use clap::ValueEnum;
+use mba_mapper::dataset::Dataset;
+use mba_mapper::run::{RunCamera, RunSettings, Summary};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::console::Console;
+
+/// Advice when the folder cannot be written.
+pub const OUT_HINT: &str = "name a folder for --out that can be created or written";
+
+/// Advice when the tracker refuses the camera.
+pub const CAMERA_HINT: &str = "check the calibration: the tracker needs at least 32 x 32 pixels";
+
+/// The settings of a run on `dataset`; `options` is an object.
+#[must_use]
+pub fn settings(dataset: &Dataset, options: &Value) -> RunSettings {
+    RunSettings {
+        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
+        dataset: absolute(dataset.folder()),
+        frame_rate: dataset.calibration().frame_rate,
+        camera: Some(RunCamera::from(dataset.calibration())),
+        options: options.as_object().cloned().unwrap_or_default(),
+    }
+}
+
+/// `path` for somebody who looks at the run from another directory.
+#[must_use]
+pub fn absolute(path: &Path) -> String {
+    path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string()
+}
+
+/// A limit that is chosen by the program unless it is given.
+#[must_use]
+pub fn or_auto(limit: Option<impl Serialize>) -> Value {
+    limit.map_or_else(|| json!("auto"), |limit| json!(limit))
+}
+
+/// The name of a value on the command line.
+#[must_use]
+pub fn name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+}
+
+/// Says what was odd in a finished run, and where it is.
+pub fn announce(summary: &Summary, out: &Path, console: &Console) {
+    for warning in &summary.warnings {
+        console.warning(warning);
+    }
+    note_written(out, console);
+}
+
+/// Says where a run is.
+pub fn note_written(out: &Path, console: &Console) {
+    console.note(format!("wrote {}", out.display()));
+}

@@ -40,10 +40,9 @@ pub fn slam_into(
 ) -> anyhow::Result<Summary> {
     let progress = console.progress(dataset.len(), "frames");
     let observe = |at: SlamProgress| match at {
-        SlamProgress::Frames { frames, keyframes, gaussians, loops } => {
+        SlamProgress::Frames { frames, keyframes, map, loops } => {
             progress.set_position(frames as u64);
-            progress
-                .set_message(format!("frames: {keyframes} keyframes, {gaussians} Gaussians, {loops} loops"));
+            progress.set_message(format!("frames: {keyframes} keyframes, {map}, {loops} loops"));
         }
         SlamProgress::Refinement { position, psnr } => {
             progress.set_length(REFINEMENT_STEPS);

@@ -64,10 +64,7 @@ impl MapModel for FieldMap {
 
     /// Grows the box; surfaces come with the steps.
     fn seed(&mut self, _bench: &mut Workbench, view: &SeedView<'_>, _most: usize) {
-        if let Some(region) = measured_region(view.seen, &view.world_from_camera) {
-            self.field.grow(&region);
-            self.is_seeded = true;
-        }
+        self.make_room(view.seen, &view.world_from_camera);
     }
 
     fn evaluate(
@@ -100,8 +97,16 @@ impl MapModel for FieldMap {
     /// Nodes of planes stay where they are.
     fn reorder(&mut self) {}
 
-    /// A field has no parts that belong to a keyframe: what moved is learnt again at its new place.
+    /// A field has no parts that belong to a keyframe: what moved is learnt again at its new place, and where it was,
+    /// the rays that pass through make space free.
     fn move_along(&mut self, _moves: &WorldMoves) {}
+
+    fn make_room(&mut self, seen: &Observation, world_from_camera: &RigidTransform) {
+        if let Some(region) = measured_region(seen, world_from_camera) {
+            self.field.grow(&region);
+            self.is_seeded = true;
+        }
+    }
 }
 
 /// The box around what a frame measured and its camera; `None` without any depth.
@@ -121,4 +126,40 @@ fn measured_region(seen: &Observation, world_from_camera: &RigidTransform) -> Op
     let reach = |x: f64| (x - MARGIN, x + MARGIN);
     (!depths.is_empty())
         .then(|| Region::around(least.map(|x| reach(x).0).into(), most.map(|x| reach(x).1).into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::PinholeCamera;
+    use mba_tracker::image::PixelRectangle;
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    #[test]
+    fn the_box_holds_what_is_seen_wherever_a_keyframe_is_moved_to() {
+        let camera = PinholeCamera { width: 16, height: 12, fx: 16.0, fy: 16.0, cx: 7.5, cy: 5.5 };
+        let region = PixelRectangle { left: 0, top: 0, right: 16, bottom: 12 };
+        let plane = || vec![0; 16 * 12];
+        let colour = [plane(), plane(), plane()];
+        let seen = Observation { camera, colour, depth: vec![2.0; 16 * 12], region };
+        let mut map = FieldMap::new(1);
+        assert!(map.is_empty());
+        for x in [0.0, 1.5] {
+            let translation = Vector3::new(x, 0.0, 0.0);
+            map.make_room(&seen, &RigidTransform { translation, ..RigidTransform::identity() });
+        }
+        assert!(!map.is_empty());
+        // Columns reach from -7.5/16 to 4.5/16 of the depth, as every fourth is looked at; cells have 0.24 m.
+        let (least, most) = (-2.0 * 7.5 / 16.0 - MARGIN, 1.5 + 2.0 * 4.5 / 16.0 + MARGIN);
+        let width = (most / 0.24).ceil() * 0.24 - (least / 0.24).floor() * 0.24;
+        let height = (2.0 * 2.5 / 16.0 + MARGIN) / 0.24;
+        let height = (height.ceil() + ((2.0 * 5.5 / 16.0 + MARGIN) / 0.24).ceil()) * 0.24;
+        let length = (((2.0 + MARGIN) / 0.24).ceil() + 1.0) * 0.24;
+        let volume = map.field.region().volume();
+        assert!(
+            (volume - width * height * length).abs() < 1e-6,
+            "{volume}, not {width} x {height} x {length}"
+        );
+    }
 }

@@ -1,11 +1,13 @@
 //! Gaussians as the map of the adjustment.
 
+use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
 use super::engine::{Exposure, ExposureLoss};
 use super::ledger::Ledger;
 use super::map_model::{MapModel, MapSize, SeedView, Workbench};
 use super::moving::{WorldMoves, move_gaussians};
+use super::observation::Observation;
 use super::schedule::StepPlan;
 use super::{adam, density, seeding};
 use crate::gaussians::Gaussians;
@@ -80,4 +82,7 @@ impl MapModel for GaussianMap {
     fn move_along(&mut self, moves: &WorldMoves) {
         move_gaussians(&mut self.gaussians, &self.ledger.origins, moves);
     }
+
+    /// There are no bounds.
+    fn make_room(&mut self, _seen: &Observation, _world_from_camera: &RigidTransform) {}
 }

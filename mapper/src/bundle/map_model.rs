@@ -122,6 +122,9 @@ pub(super) trait MapModel {
 
     /// Moves parts of the map with their keyframes, as far as it has parts.
     fn move_along(&mut self, moves: &WorldMoves);
+
+    /// Makes room for what a keyframe sees from a new pose.
+    fn make_room(&mut self, seen: &Observation, world_from_camera: &RigidTransform);
 }
 
 /// A map of either kind, with what its optimiser remembers.

@@ -44,7 +44,11 @@ impl BundleAdjustment {
             keyframe.prior.middle = new_world_from_world.compose(&keyframe.prior.middle);
             moves.moves.push((keyframe.index, new_world_from_world));
         }
-        self.state.map.model_mut().move_along(&moves);
+        let map = self.state.map.model_mut();
+        map.move_along(&moves);
+        for (keyframe, frame) in self.keyframes.iter().zip(&self.state.frames) {
+            map.make_room(keyframe.observation.level(0), &frame.path.mid());
+        }
         moves
     }
 }

@@ -93,7 +93,7 @@ impl BackEnd {
             observe(SlamProgress::Frames {
                 frames: self.writer.exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),
-                gaussians: self.map.bundle.state.map.size().gaussians(),
+                map: self.map.bundle.state.map.size(),
                 loops: self.loops.closed(),
             });
         }

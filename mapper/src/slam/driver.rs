@@ -8,6 +8,7 @@ use super::back_end::BackEnd;
 use super::messages::link;
 use super::settings::SlamSettings;
 use super::{SlamError, front_end};
+use crate::bundle::MapSize;
 use crate::dataset::Dataset;
 use crate::mapping::{Finish, MapError, MapProgress};
 use crate::run::{RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
@@ -22,8 +23,8 @@ pub enum SlamProgress {
         frames: usize,
         /// Keyframes of the map.
         keyframes: usize,
-        /// Gaussians now.
-        gaussians: usize,
+        /// How large the map is.
+        map: MapSize,
         /// Loops that were closed.
         loops: usize,
     },

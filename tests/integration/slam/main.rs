@@ -1,5 +1,6 @@
 //! Tracking and mapping at the same time.
 
+mod field;
 mod loops;
 mod quality;
 mod stream;

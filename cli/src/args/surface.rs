@@ -10,8 +10,8 @@ use super::{non_negative, positive};
 /// Arguments of `mba mesh`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The map is rendered from the keyframes of the run, and the depth of all views is fused into one surface. Only what \
-a keyframe sees is kept. FILE is a PLY file with colours that any viewer of meshes opens, in metres.
+The map is rendered from the keyframes of the run. From Gaussians, the depth of all views is fused into one surface; \
+that of a field is where its signed distance is zero. Only what a keyframe sees is kept. FILE is a PLY file with colours that any viewer of meshes opens, in metres.
 
 A run has a world of its own, that of its first frame. With --align, the run's trajectory is aligned with another \
 one by positions and orientations, and the mesh is in the frame of that.

@@ -3,9 +3,10 @@
 use std::time::Instant;
 
 use indicatif::ProgressBar;
+use mba_mapper::rendering::Scene;
 use mba_mapper::run::{FrameStatus, MAP_FILE, Run};
 use mba_mapper::surfaces::{
-    DepthView, FusionSettings, MapViews, PASSES, SurfaceError, Trim, ViewSource, surface_of_views, write_mesh,
+    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map, write_mesh,
 };
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;
@@ -39,15 +40,16 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
     let start = Instant::now();
     let run = open::run(&args.run)?;
     let map = open::map(&run)?;
+    let map = Scene::from(&map);
     let camera = camera(&run)?;
     let poses = keyframe_poses(&run)?;
     let views = poses.len();
     let alignment = args.align.as_ref().map(|file| align(&run, file, args.max_dt)).transpose()?;
-    let progress = console.progress(PASSES * views, "surface");
-    let mut source = Watched { views: MapViews::new(&map, camera, poses), progress };
+    let progress = console.progress(passes(map) * views, "surface");
+    let mut source = Watched { views: MapViews::new(map, camera, poses), progress };
     let settings = FusionSettings { voxel: 0.01 * args.voxel_cm, ..FusionSettings::default() };
     let trim = Trim { least_area: 1e-4 * args.least_area_cm2 };
-    let mut mesh = surface_of_views(&mut source, &settings, &trim)
+    let mut mesh = surface_of_map(map, &mut source, &settings, &trim)
         .map_err(|error| (hint(&error), error))
         .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
     source.progress.finish_and_clear();
@@ -132,7 +134,7 @@ fn table(written: &Written) -> String {
     let Written { vertices, triangles, area_m2, voxel_cm, views, seconds, .. } = written;
     let mut rows = vec![
         ("surface", format!("{area_m2:.2} m2 in {triangles} triangles, {vertices} vertices")),
-        ("fused", format!("{views} views with voxels of {voxel_cm} cm in {seconds:.1} s")),
+        ("seen", format!("from {views} views, with voxels of {voxel_cm} cm, in {seconds:.1} s")),
     ];
     rows.extend(written.alignment.as_ref().map(AlignmentFigures::row));
     rows.push(("written to", written.file.clone()));

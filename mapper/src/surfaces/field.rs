@@ -27,7 +27,7 @@ pub struct FieldBox {
 
 impl FieldBox {
     /// Points along each axis: the last one is at or beyond the maximum.
-    fn points(&self) -> Result<[usize; 3], SurfaceError> {
+    pub(super) fn points(&self) -> Result<[usize; 3], SurfaceError> {
         const MOST: f64 = 1e6;
         let cells = std::array::from_fn(|axis| ((self.max[axis] - self.min[axis]) / self.voxel).ceil());
         let in_range = |cells: &f64| (1.0..MOST).contains(cells);

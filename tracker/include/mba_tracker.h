@@ -7,6 +7,7 @@
  *  - inputs are only read, and only during the call; outputs are written only on MBA_OK and overlap no input;
  *  - the memory given to mba_tracker_init belongs to the tracker: it is not written, moved or copied while the tracker
  *    is in use. There is nothing to destroy;
+ *  - what is given for a tracker has at least eight initialised bytes;
  *  - one thread at a time uses a tracker; different trackers are independent.
  */
 
@@ -15,6 +16,9 @@
 
 #include <stddef.h>
 #include <stdint.h>
+
+/* A tracker in the caller's memory. */
+typedef struct MbaTracker MbaTracker;
 
 // All is well.
 #define MBA_OK 0
@@ -87,9 +91,6 @@
 
 // Alignment in bytes of the memory of a tracker.
 #define MBA_MEMORY_ALIGNMENT 64
-
-// A tracker in the caller's memory.
-typedef struct MbaTracker MbaTracker;
 
 // Calibration and settings. Fill it with `mba_config_default` or `mba_config_compact`, then change what you need.
 typedef struct {
@@ -293,6 +294,28 @@ int32_t mba_set_reference(MbaTracker *tracker,
                           const MbaImage *image,
                           const MbaDepth *depth,
                           const MbaPose *world_from_camera);
+
+// Replaces the keyframe as `mba_set_reference` does and goes on near `world_from_camera`, wherever the camera was thought
+// to be before: for a lost tracker whose place was recognised. `world_from_view` is the pose of the images. How the
+// camera moves is unknown until the next frame. When anything is refused the tracker stays as it was.
+//
+// # Safety
+// `tracker`: null, misaligned, or the handle of a tracker that no other thread uses meanwhile. The others: null,
+// misaligned, or one value each, and images have as many bytes as they say.
+int32_t mba_relocate(MbaTracker *tracker,
+                     const MbaImage *image,
+                     const MbaDepth *depth,
+                     const MbaPose *world_from_view,
+                     const MbaPose *world_from_camera);
+
+// Moves all that the tracker remembers into another world, as a loop closure does: `new_world_from_world` maps points of
+// the world so far into the new one, in which later poses are. Nothing else changes.
+//
+// # Safety
+// `tracker`: null, misaligned, or the handle of a tracker that no other thread uses meanwhile. `new_world_from_world`:
+// null, misaligned, or one `MbaPose`.
+int32_t mba_move_world(MbaTracker *tracker,
+                       const MbaPose *new_world_from_world);
 
 // Forgets everything but the configuration; the next frame starts a new world.
 //

@@ -4,10 +4,10 @@ use core::ffi::CStr;
 use core::ptr::{null, null_mut};
 
 use mba_tracker::capi::codes::*;
-use mba_tracker::capi::types::{MbaConfig, MbaFrame, MbaPose, MbaResult};
+use mba_tracker::capi::types::{MbaConfig, MbaDepth, MbaFrame, MbaImage, MbaPose, MbaResult};
 use mba_tracker::capi::{
-    mba_config_default, mba_error_string, mba_memory_size, mba_reset, mba_set_reference, mba_track,
-    mba_tracker_init,
+    mba_config_default, mba_error_string, mba_memory_size, mba_move_world, mba_relocate, mba_reset,
+    mba_set_reference, mba_track, mba_tracker_init,
 };
 
 use super::{Bench, frame_of};
@@ -140,11 +140,39 @@ fn frames() {
         // SAFETY: images that are not refused have as many bytes as they say.
         assert_eq!(unsafe { mba_track(tracker, &frame, result.as_mut_ptr()) }, *code, "change {k}");
     }
-    for bad in [[0.0; 4], [f64::NAN; 4], [1.0; 4]] {
-        let pose = MbaPose { rotation: bad, translation: [0.0; 3] };
-        // SAFETY: all pointers are valid.
-        let code = unsafe { mba_set_reference(tracker, &good.image, &good.depth, &pose) };
-        assert_eq!(code, MBA_ERROR_POSE);
+}
+
+#[test]
+fn views_and_poses_from_outside() {
+    let mut bench = Bench::new(1);
+    let (_, tracker) = bench.init();
+    let frame = frame_of(&bench.frames[0]);
+    let (image, depth) = (&frame.image, &frame.depth);
+    let good = MbaPose { rotation: [0.0, 0.0, 0.0, 1.0], translation: [0.0; 3] };
+    let no_rotation = [[0.0; 4], [f64::NAN; 4], [1.0; 4]].map(|rotation| MbaPose { rotation, ..good });
+    let nowhere = MbaPose { translation: [0.0, f64::INFINITY, 0.0], ..good };
+    let refused = no_rotation.iter().chain([&nowhere]).map(|pose| (&raw const *pose, MBA_ERROR_POSE));
+    let pointers = [(null(), MBA_ERROR_NULL_POINTER), (shifted(&good).cast_const(), MBA_ERROR_MISALIGNED)];
+    for (pose, code) in refused.chain(pointers) {
+        // SAFETY: poses are null, misaligned or valid; all other pointers are valid.
+        unsafe {
+            assert_eq!(mba_set_reference(tracker, image, depth, pose), code);
+            assert_eq!(mba_relocate(tracker, image, depth, pose, &good), code);
+            assert_eq!(mba_relocate(tracker, image, depth, &good, pose), code);
+            assert_eq!(mba_move_world(tracker, pose), code);
+        }
+    }
+    let (short, small) =
+        (MbaImage { size_bytes: image.size_bytes - 1, ..*image }, MbaDepth { height: 119, ..*depth });
+    // SAFETY: pointers are null or valid, and images have as many bytes as they say.
+    unsafe {
+        assert_eq!(mba_relocate(null_mut(), image, depth, &good, &good), MBA_ERROR_NULL_POINTER);
+        assert_eq!(mba_relocate(tracker, null(), depth, &good, &good), MBA_ERROR_NULL_POINTER);
+        assert_eq!(mba_relocate(tracker, image, null(), &good, &good), MBA_ERROR_NULL_POINTER);
+        assert_eq!(mba_relocate(tracker, &short, depth, &good, &good), MBA_ERROR_SHORT_BUFFER);
+        assert_eq!(mba_set_reference(tracker, image, &small, &good), MBA_ERROR_IMAGE_SIZE);
+        assert_eq!(mba_relocate(tracker, image, &small, &good, &good), MBA_ERROR_IMAGE_SIZE);
+        assert_eq!(mba_move_world(null_mut(), &good), MBA_ERROR_NULL_POINTER);
     }
 }
 

@@ -13,7 +13,7 @@ use crate::align::UNKNOWNS;
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{ColourView, DepthView, PixelFormat};
 use crate::photometric::InverseResponse;
-use crate::{Effort, Frame, FrameResult, FrameStatus, ReferenceMode, TrackerConfig};
+use crate::{Effort, Frame, FrameResult, FrameStatus, ReferenceMode, ReferenceView, TrackerConfig};
 
 /// The configuration that C asks for, checked.
 ///
@@ -126,6 +126,25 @@ pub(super) unsafe fn frame<'a>(frame: &MbaFrame) -> Result<Frame<'a>, i32> {
     // SAFETY: passed on from the caller.
     let (colour, depth) = unsafe { (colour(&frame.image)?, depth(&frame.depth)?) };
     Ok(Frame { timestamp: frame.timestamp, exposure: frame.exposure, colour, depth, angular_velocity })
+}
+
+/// A view from outside.
+///
+/// # Safety
+/// As for [`colour`] and [`depth`]; pointers that are neither null nor misaligned point to one value each.
+pub(super) unsafe fn view<'a>(
+    image: *const MbaImage,
+    depth_image: *const MbaDepth,
+    world_from_camera: *const MbaPose,
+) -> Result<ReferenceView<'a>, i32> {
+    // SAFETY: passed on from the caller.
+    unsafe {
+        Ok(ReferenceView {
+            colour: colour(read(image)?)?,
+            depth: depth(read(depth_image)?)?,
+            world_from_camera: transform(read(world_from_camera)?),
+        })
+    }
 }
 
 /// A pose of C as it is; the tracker checks it.

@@ -12,7 +12,7 @@ use super::types::{MAGIC, MbaConfig, MbaDepth, MbaFrame, MbaImage, MbaPose, MbaR
 use super::{convert, pointers};
 use crate::geometry::PinholeCamera;
 use crate::photometric::InverseResponse;
-use crate::{ReferenceView, SimdLevel, Tracker, TrackerConfig};
+use crate::{SimdLevel, Tracker, TrackerConfig};
 
 const _: () = assert!(align_of::<MbaTracker>() <= MBA_MEMORY_ALIGNMENT);
 
@@ -187,16 +187,54 @@ pub unsafe extern "C" fn mba_set_reference(
 ) -> i32 {
     code(|| {
         // SAFETY: passed on from the caller.
-        let handle = unsafe { pointers::tracker(tracker) }?;
-        // SAFETY: passed on from the caller.
-        let view = unsafe {
-            ReferenceView {
-                colour: convert::colour(pointers::read(image)?)?,
-                depth: convert::depth(pointers::read(depth)?)?,
-                world_from_camera: convert::transform(pointers::read(world_from_camera)?),
-            }
-        };
+        let (handle, view) =
+            unsafe { (pointers::tracker(tracker)?, convert::view(image, depth, world_from_camera)?) };
         handle.tracker.set_reference(&view).map_err(code_of_frame)
+    })
+}
+
+/// Replaces the keyframe as `mba_set_reference` does and goes on near `world_from_camera`, wherever the camera was thought
+/// to be before: for a lost tracker whose place was recognised. `world_from_view` is the pose of the images. How the
+/// camera moves is unknown until the next frame. When anything is refused the tracker stays as it was.
+///
+/// # Safety
+/// `tracker`: null, misaligned, or the handle of a tracker that no other thread uses meanwhile. The others: null,
+/// misaligned, or one value each, and images have as many bytes as they say.
+// SAFETY: no other symbol of this name is linked.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mba_relocate(
+    tracker: *mut MbaTracker,
+    image: *const MbaImage,
+    depth: *const MbaDepth,
+    world_from_view: *const MbaPose,
+    world_from_camera: *const MbaPose,
+) -> i32 {
+    code(|| {
+        // SAFETY: passed on from the caller.
+        let (handle, view) =
+            unsafe { (pointers::tracker(tracker)?, convert::view(image, depth, world_from_view)?) };
+        // SAFETY: passed on from the caller.
+        let camera = convert::transform(unsafe { pointers::read(world_from_camera) }?);
+        handle.tracker.relocate(&view, &camera).map_err(code_of_frame)
+    })
+}
+
+/// Moves all that the tracker remembers into another world, as a loop closure does: `new_world_from_world` maps points of
+/// the world so far into the new one, in which later poses are. Nothing else changes.
+///
+/// # Safety
+/// `tracker`: null, misaligned, or the handle of a tracker that no other thread uses meanwhile. `new_world_from_world`:
+/// null, misaligned, or one `MbaPose`.
+// SAFETY: no other symbol of this name is linked.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn mba_move_world(
+    tracker: *mut MbaTracker,
+    new_world_from_world: *const MbaPose,
+) -> i32 {
+    code(|| {
+        // SAFETY: passed on from the caller.
+        let (handle, moved) = unsafe { (pointers::tracker(tracker)?, pointers::read(new_world_from_world)?) };
+        handle.tracker.move_world(&convert::transform(moved)).map_err(code_of_frame)
     })
 }
 

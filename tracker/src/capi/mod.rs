@@ -9,6 +9,7 @@
 //! * outputs are written only when a function returns [`codes::MBA_OK`], and do not overlap any input;
 //! * the memory given to [`mba_tracker_init`] belongs to the tracker from then on. It may be reused or freed at any
 //!   time, there is nothing to destroy; the tracker must not be used afterwards, nor be moved;
+//! * what is given for a tracker has at least eight initialised bytes;
 //! * a tracker is used by one thread at a time; different trackers are independent.
 
 pub mod codes;

@@ -43,11 +43,11 @@ pub(super) fn check_output<T>(pointer: *mut T) -> Result<(), i32> {
 /// The tracker in C's memory.
 ///
 /// # Safety
-/// A pointer that is neither null nor misaligned points to `size_of::<MbaTracker>()` initialised bytes that nobody else
-/// uses during `'a`; they do not start with the magic word unless `mba_tracker_init` has written a tracker there.
+/// A pointer that is neither null nor misaligned points to eight initialised bytes or more that nobody else uses during
+/// `'a`; they do not start with the magic word unless `mba_tracker_init` has written a tracker there.
 pub(super) unsafe fn tracker<'a>(pointer: *mut MbaTracker) -> Result<&'a mut MbaTracker, i32> {
     check(pointer)?;
-    // SAFETY: within the bytes that the caller vouches for, and aligned as the tracker is.
+    // SAFETY: the first of the bytes that the caller vouches for, and aligned as the tracker is.
     let magic = unsafe { (&raw const (*pointer).magic).read() };
     if magic != MAGIC {
         return Err(MBA_ERROR_NOT_INITIALISED);

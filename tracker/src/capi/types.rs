@@ -134,8 +134,9 @@ pub struct MbaResult {
     pub ticks: u64,
 }
 
-/// A tracker in the caller's memory.
+/// A tracker in the caller's memory. C knows its name only; the word that tells it from other memory comes first.
 #[derive(Debug)]
+#[repr(C)]
 pub struct MbaTracker {
     pub(super) magic: u64,
     pub(super) clock: Option<extern "C" fn() -> u64>,

@@ -12,6 +12,9 @@ use crate::transfer::BrightnessModel;
 /// Levels on which several first guesses compete.
 const COMPETING_LEVELS: usize = 2;
 
+/// Guesses that go on from the coarsest level to the next.
+const FINALISTS: usize = 3;
+
 /// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
 const MIN_AGREEING: f64 = 0.05;
 
@@ -50,6 +53,16 @@ pub(super) struct Aligned {
     pub(super) iterations: usize,
 }
 
+/// Where the guesses ended on one level.
+struct Round {
+    /// Scores and estimates, best first.
+    finalists: ArrayVec<(f64, Estimate), FINALISTS>,
+    /// Outcome of the best.
+    winner: Option<LevelOutcome>,
+    /// Linearisations of all guesses.
+    iterations: usize,
+}
+
 impl FrameTask<'_> {
     /// First guesses of the mid pose, most likely first.
     pub(super) fn guesses(&self) -> ArrayVec<RigidTransform, MAX_GUESSES> {
@@ -80,30 +93,25 @@ impl FrameTask<'_> {
         directions.map(move |(x, y)| last.perturbed(&Vector6::new(0.0, 0.0, 0.0, x * angle, y * angle, 0.0)))
     }
 
-    /// Aligns coarse to fine. The guesses compete on the coarsest levels, where an iteration costs next to nothing;
-    /// the best goes on alone.
+    /// Aligns coarse to fine. All guesses compete on the coarsest level, where an iteration costs next to nothing,
+    /// the [`FINALISTS`] on the next; the best goes on alone.
     pub(super) fn run(&self, guesses: &[RigidTransform], scratch: &mut AlignScratch) -> Aligned {
         let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
         let mut iterations = 0;
-        let mut best: Option<(f64, LevelOutcome)> = None;
-        for guess in guesses {
-            let mut outcome = LevelOutcome::unchanged(self.estimate_at(guess));
-            for level in (last_competing..=coarsest).rev() {
-                let mid = outcome.estimate.keyframe_from_camera.mid();
-                let start = Estimate { brightness: outcome.estimate.brightness, ..self.estimate_at(&mid) };
-                outcome = self.level(level, start, scratch);
-                iterations += outcome.iterations;
-            }
-            let score = score(&outcome, self.alignment.reference.keypoints[last_competing].len());
-            if best.as_ref().is_none_or(|(best_score, _)| score < *best_score) {
-                best = Some((score, outcome));
-            }
+        let mut outcome = LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid));
+        let mut starts: ArrayVec<Estimate, MAX_GUESSES> =
+            guesses.iter().map(|guess| self.estimate_at(guess)).take(MAX_GUESSES).collect();
+        for level in (last_competing..=coarsest).rev() {
+            let round = self.compete(level, &starts, scratch);
+            iterations += round.iterations;
+            starts.clear();
+            starts.extend(round.finalists.iter().map(|(_, estimate)| Estimate {
+                brightness: estimate.brightness,
+                ..self.estimate_at(&estimate.keyframe_from_camera.mid())
+            }));
+            outcome = round.winner.unwrap_or(outcome);
         }
-        let mut outcome = best.map_or_else(
-            || LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)),
-            |(_, outcome)| outcome,
-        );
         for level in (0..last_competing).rev() {
             let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
             outcome = self.level(level, start, scratch);
@@ -111,6 +119,25 @@ impl FrameTask<'_> {
         }
         outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
         Aligned { outcome, iterations }
+    }
+
+    /// Aligns from every start on one level and ranks where they ended.
+    fn compete(&self, level: usize, starts: &[Estimate], scratch: &mut AlignScratch) -> Round {
+        let mut round = Round { finalists: ArrayVec::new(), winner: None, iterations: 0 };
+        for start in starts {
+            let outcome = self.level(level, *start, scratch);
+            round.iterations += outcome.iterations;
+            let score = score(&outcome, self.alignment.reference.keypoints[level].len());
+            let rank = round.finalists.iter().take_while(|(other, _)| *other <= score).count();
+            if rank < FINALISTS {
+                round.finalists.truncate(FINALISTS - usize::from(round.finalists.len() == FINALISTS));
+                round.finalists.insert(rank, (score, outcome.estimate));
+            }
+            if rank == 0 {
+                round.winner = Some(outcome);
+            }
+        }
+        round
     }
 
     fn level(&self, level: usize, start: Estimate, scratch: &mut AlignScratch) -> LevelOutcome {

@@ -8,12 +8,13 @@ use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, M
 use crate::geometry::RigidTransform;
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 
 /// Levels on which several first guesses compete.
-const COMPETING_LEVELS: usize = 2;
+pub(super) const COMPETING_LEVELS: usize = 2;
 
 /// Guesses that go on from the coarsest level to the next.
-const FINALISTS: usize = 3;
+pub(super) const FINALISTS: usize = 3;
 
 /// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
 const MIN_AGREEING: f64 = 0.05;
@@ -21,8 +22,12 @@ const MIN_AGREEING: f64 = 0.05;
 /// Steps below this many pixels of a competing level are left to the finer ones.
 const COMPETING_MIN_STEP: f64 = 0.1;
 
-/// Upper bound of first guesses.
-const MAX_GUESSES: usize = 16;
+/// Step between the rows and columns of the depth map that take part on the competing levels and on the others.
+pub(super) const COMPETING_STRIDE: usize = 4;
+pub(super) const FINE_STRIDE: usize = 2;
+
+/// Upper bound of first guesses: gyroscope, steady motion, the eight turns, rest and the way back.
+pub(super) const MAX_GUESSES: usize = 12;
 
 /// When the motion is unknown, turns by this many pixels of the coarsest level are tried in eight directions.
 const SEARCH_PIXELS: f64 = 3.0;
@@ -49,8 +54,8 @@ pub(super) struct FrameTask<'a> {
 pub(super) struct Aligned {
     /// Outcome of the finest level, with the direction of time settled.
     pub(super) outcome: LevelOutcome,
-    /// Linearisations on all levels.
-    pub(super) iterations: usize,
+    /// Work on all levels.
+    pub(super) work: Work,
 }
 
 /// Where the guesses ended on one level.
@@ -59,8 +64,8 @@ struct Round {
     finalists: ArrayVec<(f64, Estimate), FINALISTS>,
     /// Outcome of the best.
     winner: Option<LevelOutcome>,
-    /// Linearisations of all guesses.
-    iterations: usize,
+    /// Work of all guesses.
+    work: Work,
 }
 
 impl FrameTask<'_> {
@@ -98,13 +103,13 @@ impl FrameTask<'_> {
     pub(super) fn run(&self, guesses: &[RigidTransform], scratch: &mut AlignScratch) -> Aligned {
         let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
-        let mut iterations = 0;
+        let mut work = Work::none();
         let mut outcome = LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid));
         let mut starts: ArrayVec<Estimate, MAX_GUESSES> =
             guesses.iter().map(|guess| self.estimate_at(guess)).take(MAX_GUESSES).collect();
         for level in (last_competing..=coarsest).rev() {
             let round = self.compete(level, &starts, scratch);
-            iterations += round.iterations;
+            work += round.work;
             starts.clear();
             starts.extend(round.finalists.iter().map(|(_, estimate)| Estimate {
                 brightness: estimate.brightness,
@@ -115,18 +120,18 @@ impl FrameTask<'_> {
         for level in (0..last_competing).rev() {
             let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
             outcome = self.level(level, start, scratch);
-            iterations += outcome.iterations;
+            work += outcome.work;
         }
         outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
-        Aligned { outcome, iterations }
+        Aligned { outcome, work }
     }
 
     /// Aligns from every start on one level and ranks where they ended.
     fn compete(&self, level: usize, starts: &[Estimate], scratch: &mut AlignScratch) -> Round {
-        let mut round = Round { finalists: ArrayVec::new(), winner: None, iterations: 0 };
+        let mut round = Round { finalists: ArrayVec::new(), winner: None, work: Work::none() };
         for start in starts {
             let outcome = self.level(level, *start, scratch);
-            round.iterations += outcome.iterations;
+            round.work += outcome.work;
             let score = score(&outcome, self.alignment.reference.keypoints[level].len());
             let rank = round.finalists.iter().take_while(|(other, _)| *other <= score).count();
             if rank < FINALISTS {
@@ -144,7 +149,7 @@ impl FrameTask<'_> {
         let competing = level + COMPETING_LEVELS >= self.alignment.reference.levels.len();
         let plan = LevelPlan {
             level,
-            depth_stride: if competing { 4 } else { 2 },
+            depth_stride: if competing { COMPETING_STRIDE } else { FINE_STRIDE },
             min_step: if competing { COMPETING_MIN_STEP } else { self.alignment.settings.min_step },
             max_iterations: self.alignment.settings.max_iterations,
             blur: self.blur,

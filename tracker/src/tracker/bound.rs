@@ -76,16 +76,16 @@ mod tests {
     #[test]
     fn bound_is_the_product_of_its_factors() {
         let config = TrackerConfig::compact(CAMERA, 0.001, InverseResponse::linear());
-        // Keypoints: 7x5 cells on level 0, 6x5 on level 1, 5x4 on level 2. Linearisations: twice 12, 3 and 1 starts
+        // Keypoints: 7x5 cells on level 0, 6x5 on level 1, 5x4 on level 2. Linearisations: twice 12, 8 and 1 starts
         // of 8 on levels 2, 1 and 0, once 1, 1 and 1; each with two predictions of every patch.
-        let patches = 2 * 8 * (2 * (12 * 20 + 3 * 30 + 35) + 20 + 30 + 35);
+        let patches = 2 * 8 * (2 * (12 * 20 + 8 * 30 + 35) + 20 + 30 + 35);
         // The map of 80x60 with every fourth point and, for the noise, every eighth; second and fourth on level 0.
         let (coarse, fine) = (20 * 15 + 10 * 8, 40 * 30 + 20 * 15);
         let expected = Work {
-            linearisations: 8 * (2 * (12 + 3 + 1) + 3),
+            linearisations: 8 * (2 * (12 + 8 + 1) + 3),
             patches,
             view_pixels: patches * 32 * 32,
-            depth_points: 8 * (2 * (15 * coarse + fine) + 2 * coarse + fine),
+            depth_points: 8 * (2 * (20 * coarse + fine) + 2 * coarse + fine),
             blur_taps: 0,
             image_pixels: 3 * 160 * 120,
         };
@@ -98,7 +98,7 @@ mod tests {
         let deblurring = TrackerConfig { reference: ReferenceMode::Deblurred, ..compact.clone() };
         // Four iterations of two blurs and one before them, twice.
         assert_eq!(deblurring.work_bound().blur_taps, 2 * 9 * 32 * 160 * 120);
-        // Two guesses on level 2 and one, their best two being all of them, on level 1, for each of three keyframes.
+        // Two guesses on level 2 and one, both going on, on level 1, for each of three keyframes.
         let recovering = TrackerConfig { recent_keyframes: 3, ..compact.clone() };
         let more = recovering.work_bound().linearisations - compact.work_bound().linearisations;
         assert_eq!(more, 3 * 8 * (2 + 2));

@@ -13,8 +13,9 @@ use crate::work::Work;
 /// Levels on which several first guesses compete.
 pub(super) const COMPETING_LEVELS: usize = 2;
 
-/// Guesses that go on from the coarsest level to the next.
-pub(super) const FINALISTS: usize = 3;
+/// Guesses that go on from the coarsest level to the next. Its few pixels rank the rest well enough, but not the best:
+/// with half as many, the way back from a lost frame is missed.
+pub(super) const FINALISTS: usize = 8;
 
 /// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
 const MIN_AGREEING: f64 = 0.05;

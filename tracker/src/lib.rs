@@ -76,6 +76,7 @@ pub mod surface;
 mod tracker;
 pub mod trajectory;
 pub mod transfer;
+mod work;
 pub mod workspace;
 
 /// Instruction sets that the kernels can run on; chosen once, at construction.
@@ -84,3 +85,4 @@ pub use tracker::{
     Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, ReferenceMode, ReferenceView, Revision,
     Tracker, TrackerConfig, WorkspacePlan, workspace_len,
 };
+pub use work::Work;

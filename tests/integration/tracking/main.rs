@@ -10,3 +10,4 @@ mod recovery;
 mod reference_view;
 mod scenes;
 mod sequences;
+mod work;

@@ -13,6 +13,7 @@ use crate::geometry::PinholeCamera;
 use crate::keyframe::typical_inverse_depth;
 use crate::math::sqrt_f32;
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 
 /// Why iterations on a level ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +39,8 @@ pub struct LevelOutcome {
     pub stop: StopReason,
     /// Linearisations spent.
     pub iterations: usize,
+    /// Work spent.
+    pub work: Work,
     /// Virtual views used last.
     pub views: usize,
     /// Robust standard deviation of the photometric residual relative to the nominal noise model.
@@ -62,6 +65,7 @@ impl LevelOutcome {
             estimate,
             stop: StopReason::NoData,
             iterations: 0,
+            work: Work::default(),
             views: 1,
             photometric_scale: 0.0,
             depth_scale: 0.0,
@@ -184,6 +188,11 @@ impl Alignment<'_> {
         if self.settings.depth_term {
             objective.depth = measure_depth(&objective, &estimate, plan.depth_stride, scratch.medians);
         }
+        outcome.work += Work::of_patches(in_view, objective.views);
+        if self.settings.depth_term {
+            let map = self.frame.depth;
+            outcome.work += Work::of_depth(map.width, map.height, 2 * plan.depth_stride);
+        }
         outcome.views = objective.views;
         outcome.patches = kept;
         outcome.patches_in_view = in_view;
@@ -212,6 +221,7 @@ fn descend(
 ) -> Descent {
     let mut at = objective.linearise(&outcome.estimate, None, costs);
     outcome.iterations += 1;
+    outcome.work += objective.work();
     let mut moved = 0.0;
     loop {
         outcome.information = at.hessian;
@@ -230,6 +240,7 @@ fn descend(
         let candidate = outcome.estimate.stepped(&step);
         let next = objective.linearise(&candidate, Some((at.pixels, at.depth_compared)), costs);
         outcome.iterations += 1;
+        outcome.work += objective.work();
         let ratio = gain_ratio(&at, &next, &step);
         if next.cost < at.cost && ratio > MIN_GAIN_RATIO {
             damping.accept(ratio);

@@ -15,6 +15,7 @@ use crate::transfer::{
     self, BrightnessModel, PatchCost, PatchSite, PhotometricSums, ResidualModel, TransferProblem,
     virtual_views,
 };
+use crate::work::Work;
 
 /// The sharp reference that a frame is aligned with.
 #[derive(Clone, Copy, Debug)]
@@ -101,6 +102,16 @@ pub(super) struct Linearised {
 }
 
 impl Objective<'_> {
+    /// What one evaluation takes.
+    pub(super) fn work(&self) -> Work {
+        let patches = Work::of_patches(self.sites.len(), self.views);
+        let depth = self.depth.as_ref().map_or(Work::none(), |depth| {
+            let map = depth.problem.current;
+            Work::of_depth(map.width, map.height, depth.problem.stride)
+        });
+        Work { linearisations: 1, ..patches + depth }
+    }
+
     /// Evaluates the objective. `expected_counts` are the pixels and depth points of the linearisation that this
     /// cost is compared with: costs are scaled to them, so that losing data never looks like an improvement.
     pub(super) fn linearise(

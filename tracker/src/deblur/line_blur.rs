@@ -4,20 +4,18 @@
 //!
 //! A vector is one row of a block. All its pixels share the displacement, so a sample of the path is a bilinear
 //! mix of unaligned row loads with the same weights in every lane: no gathers. Blocks whose path leaves the image
-//! take a scalar way that continues the border.
+//! load through a row buffer that continues the border.
 //!
 //! # Cost
 //!
 //! Per block of 32 pixels and view: ten loads and about thirty arithmetic operations.
 
-use fearless_simd::{Level, dispatch, f32x8, prelude::*};
+use fearless_simd::{Level, dispatch, f32x8, i32x8, prelude::*};
 
 use super::flow::{BLOCK_HEIGHT, BLOCK_WIDTH, BlurFlow};
-use crate::math::floor_to_i32;
 use crate::transfer::MAX_VIRTUAL_VIEWS;
 
-/// The samples of a block's path: whole-pixel shifts and the fractions beyond them. All slots are computed whatever
-/// the number of views, which keeps the loop free of branches.
+/// The samples of a block's path: whole-pixel shifts and the fractions beyond them.
 struct Taps {
     du: [i32; MAX_VIRTUAL_VIEWS],
     dv: [i32; MAX_VIRTUAL_VIEWS],
@@ -26,26 +24,43 @@ struct Taps {
     count: usize,
 }
 
+/// `0, 1, 2...`
+const ORDINALS: [f32; MAX_VIRTUAL_VIEWS] = {
+    let mut ordinals = [0.0; MAX_VIRTUAL_VIEWS];
+    let mut k = 0;
+    while k < MAX_VIRTUAL_VIEWS {
+        ordinals[k] = k as f32;
+        k += 1;
+    }
+    ordinals
+};
+
 impl Taps {
     #[inline(always)]
-    fn new(displacement: &[f32; 2], views: usize) -> Self {
-        let mut taps = Self {
+    fn none() -> Self {
+        Self {
             du: [0; MAX_VIRTUAL_VIEWS],
             dv: [0; MAX_VIRTUAL_VIEWS],
             fu: [0.0; MAX_VIRTUAL_VIEWS],
             fv: [0.0; MAX_VIRTUAL_VIEWS],
-            count: views,
-        };
-        let scale = 1.0 / views as f32;
-        for k in 0..MAX_VIRTUAL_VIEWS {
-            let s = (k as f32 + 0.5) * scale - 0.5;
-            let (x, y) = (s * displacement[0], s * displacement[1]);
-            taps.du[k] = floor_to_i32(x);
-            taps.dv[k] = floor_to_i32(y);
-            taps.fu[k] = x - taps.du[k] as f32;
-            taps.fv[k] = y - taps.dv[k] as f32;
+            count: 0,
         }
-        taps
+    }
+
+    /// Takes `count` samples along `displacement`, eight at a time; those past the last are never used.
+    #[inline(always)]
+    fn fill<S: Simd>(&mut self, simd: S, displacement: &[f32; 2], count: usize) {
+        self.count = count;
+        let scale = 1.0 / count as f32;
+        for k in (0..count.min(MAX_VIRTUAL_VIEWS)).step_by(8) {
+            let s = (f32x8::from_slice(simd, &ORDINALS[k..k + 8]) + 0.5) * scale - 0.5;
+            let (x, y) = (s * displacement[0], s * displacement[1]);
+            let (left, top) = (x.floor(), y.floor());
+            left.to_int::<i32x8<S>>().store_slice(&mut self.du[k..k + 8]);
+            top.to_int::<i32x8<S>>().store_slice(&mut self.dv[k..k + 8]);
+            (x - left).store_slice(&mut self.fu[k..k + 8]);
+            (y - top).store_slice(&mut self.fv[k..k + 8]);
+        }
     }
 }
 
@@ -65,48 +80,77 @@ pub fn blur_along(level: Level, image: &[f32], flow: &BlurFlow, views: usize, ou
 #[inline(always)]
 fn blur_blocks<S: Simd>(simd: S, image: &[f32], flow: &BlurFlow, views: usize, out: &mut [f32]) {
     let per_row = flow.blocks_per_row();
+    let mut taps = Taps::none();
     for (block, displacement) in flow.displacement.iter().enumerate() {
         let (u, v) = ((block % per_row) * BLOCK_WIDTH, (block / per_row) * BLOCK_HEIGHT);
-        let taps = Taps::new(displacement, views);
-        if path_is_inside(&taps, flow, u, v) {
-            let sums = block_sums(simd, image, flow.width, &taps, u, v);
-            for (row, sum) in sums.iter().enumerate() {
-                let first = (v + row) * flow.width + u;
-                (*sum * (1.0 / views as f32)).store_slice(&mut out[first..first + BLOCK_WIDTH]);
-            }
+        taps.fill(simd, displacement, views);
+        let sums = if path_is_inside(&taps, flow, u, v) {
+            block_sums::<S, true>(simd, image, flow, &taps, u, v)
         } else {
-            blur_border_block(image, flow, &taps, u, v, out);
+            block_sums::<S, false>(simd, image, flow, &taps, u, v)
+        };
+        for (row, sum) in (v..flow.height).zip(&sums) {
+            let mean = *sum * (1.0 / views as f32);
+            let columns = BLOCK_WIDTH.min(flow.width - u);
+            out[row * flow.width + u..][..columns].copy_from_slice(&mean.as_slice()[..columns]);
         }
     }
 }
 
-/// Sums of the taps of one block. Rows are interpolated horizontally first: each serves two rows of the block.
+/// Sums of the taps of one block; `INSIDE` says that no load leaves the image. Rows are interpolated horizontally
+/// first: each serves two rows of the block.
 #[inline(always)]
-fn block_sums<S: Simd>(
+fn block_sums<S: Simd, const INSIDE: bool>(
     simd: S,
     image: &[f32],
-    width: usize,
+    flow: &BlurFlow,
     taps: &Taps,
     u: usize,
     v: usize,
 ) -> [f32x8<S>; BLOCK_HEIGHT] {
     let mut sums = [f32x8::splat(simd, 0.0); BLOCK_HEIGHT];
     for k in 0..taps.count {
-        let first = (v as i32 + taps.dv[k]) as usize * width + (u as i32 + taps.du[k]) as usize;
-        let load = |row: usize| {
-            let pixels = &image[first + row * width..][..BLOCK_WIDTH + 1];
-            let (left, right) =
-                (f32x8::from_slice(simd, &pixels[..BLOCK_WIDTH]), f32x8::from_slice(simd, &pixels[1..]));
-            (right - left).mul_add(taps.fu[k], left)
-        };
-        let mut above = load(0);
-        for (row, sum) in sums.iter_mut().enumerate() {
-            let below = load(row + 1);
+        let (left, top) = (u as i32 + taps.du[k], v as i32 + taps.dv[k]);
+        let mut above = mixed_row::<S, INSIDE>(simd, image, flow, left, top, taps.fu[k]);
+        for (row, sum) in (top + 1..).zip(&mut sums) {
+            let below = mixed_row::<S, INSIDE>(simd, image, flow, left, row, taps.fu[k]);
             *sum += (below - above).mul_add(taps.fv[k], above);
             above = below;
         }
     }
     sums
+}
+
+/// Eight pixels from `(left, top)` on, mixed with `fraction` of their right neighbours.
+#[inline(always)]
+fn mixed_row<S: Simd, const INSIDE: bool>(
+    simd: S,
+    image: &[f32],
+    flow: &BlurFlow,
+    left: i32,
+    top: i32,
+    fraction: f32,
+) -> f32x8<S> {
+    if INSIDE {
+        let first = top as usize * flow.width + left as usize;
+        return mixed(simd, &image[first..][..BLOCK_WIDTH + 1], fraction);
+    }
+    let row = &image[top.clamp(0, flow.height as i32 - 1) as usize * flow.width..][..flow.width];
+    if left >= 0 && left as usize + BLOCK_WIDTH < flow.width {
+        return mixed(simd, &row[left as usize..][..BLOCK_WIDTH + 1], fraction);
+    }
+    let mut pixels = [0.0; BLOCK_WIDTH + 1];
+    for (column, pixel) in (left..).zip(&mut pixels) {
+        *pixel = row[column.clamp(0, flow.width as i32 - 1) as usize];
+    }
+    mixed(simd, &pixels, fraction)
+}
+
+#[inline(always)]
+fn mixed<S: Simd>(simd: S, pixels: &[f32], fraction: f32) -> f32x8<S> {
+    let left = f32x8::from_slice(simd, &pixels[..BLOCK_WIDTH]);
+    let right = f32x8::from_slice(simd, &pixels[1..=BLOCK_WIDTH]);
+    (right - left).mul_add(fraction, left)
 }
 
 /// Whether every load of the block stays in the image. The path is straight: its ends decide.
@@ -121,26 +165,6 @@ fn path_is_inside(taps: &Taps, flow: &BlurFlow, u: usize, v: usize) -> bool {
     };
     let whole = u + BLOCK_WIDTH <= flow.width && v + BLOCK_HEIGHT <= flow.height;
     whole && inside(0) && inside(taps.count - 1)
-}
-
-fn blur_border_block(image: &[f32], flow: &BlurFlow, taps: &Taps, u: usize, v: usize, out: &mut [f32]) {
-    let (last_u, last_v) = (flow.width as i32 - 1, flow.height as i32 - 1);
-    let at = |column: i32, row: i32| {
-        image[row.clamp(0, last_v) as usize * flow.width + column.clamp(0, last_u) as usize]
-    };
-    let scale = 1.0 / taps.count as f32;
-    for row in v..(v + BLOCK_HEIGHT).min(flow.height) {
-        for column in u..(u + BLOCK_WIDTH).min(flow.width) {
-            let mut sum = 0.0;
-            for k in 0..taps.count {
-                let (x, y) = (column as i32 + taps.du[k], row as i32 + taps.dv[k]);
-                let above = at(x, y) + taps.fu[k] * (at(x + 1, y) - at(x, y));
-                let below = at(x, y + 1) + taps.fu[k] * (at(x + 1, y + 1) - at(x, y + 1));
-                sum += above + taps.fv[k] * (below - above);
-            }
-            out[row * flow.width + column] = sum * scale;
-        }
-    }
 }
 
 #[cfg(test)]

@@ -44,6 +44,8 @@ pub struct DeblurReport {
     pub residual_after: f32,
     /// Whether the sharp image was kept; otherwise it is the captured one.
     pub kept: bool,
+    /// Samples of blur paths that were taken.
+    pub taps: u64,
 }
 
 impl<'m> DeblurScratch<'m> {
@@ -98,7 +100,8 @@ impl<'m> DeblurScratch<'m> {
         if !kept {
             sharp.copy_from_slice(self.captured);
         }
-        DeblurReport { residual_before, residual_after, kept }
+        let taps = ((2 * iterations + 1) * views) as u64 * self.captured.len() as u64;
+        DeblurReport { residual_before, residual_after, kept, taps }
     }
 
     /// Blurs `sharp` and leaves the ratio of captured to blurred light; returns the root mean square difference.

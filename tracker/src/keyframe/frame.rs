@@ -16,6 +16,13 @@ pub const MAX_KEYPOINTS: usize = 640;
 /// as fit without overlap on the coarse ones.
 const CELL: [usize; MAX_LEVELS] = [24, 14, 9, 6, 4, 4];
 
+/// Keypoints that a level of `width` by `height` pixels can have: one per cell, at most [`MAX_KEYPOINTS`].
+#[must_use]
+pub fn max_keypoints(width: usize, height: usize, level: usize) -> usize {
+    let cell = CELL[level.min(MAX_LEVELS - 1)];
+    (width.div_ceil(cell) * height.div_ceil(cell)).min(MAX_KEYPOINTS)
+}
+
 /// Image, surface and keypoints of the frame that others are aligned with.
 #[derive(Debug)]
 pub struct Keyframe<'m> {

@@ -3,5 +3,5 @@
 mod frame;
 mod select;
 
-pub use frame::{Keyframe, MAX_KEYPOINTS};
+pub use frame::{Keyframe, MAX_KEYPOINTS, max_keypoints};
 pub use select::{Keypoint, SelectionSettings, select_keypoints, typical_inverse_depth};

@@ -8,9 +8,14 @@ use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, M
 use crate::geometry::RigidTransform;
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 
 /// Levels on which several first guesses compete.
-const COMPETING_LEVELS: usize = 2;
+pub(super) const COMPETING_LEVELS: usize = 2;
+
+/// Guesses that go on from the coarsest level to the next. Its few pixels rank the rest well enough, but not the best:
+/// with half as many, the way back from a lost frame is missed.
+pub(super) const FINALISTS: usize = 8;
 
 /// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
 const MIN_AGREEING: f64 = 0.05;
@@ -18,8 +23,12 @@ const MIN_AGREEING: f64 = 0.05;
 /// Steps below this many pixels of a competing level are left to the finer ones.
 const COMPETING_MIN_STEP: f64 = 0.1;
 
-/// Upper bound of first guesses.
-const MAX_GUESSES: usize = 16;
+/// Step between the rows and columns of the depth map that take part on the competing levels and on the others.
+pub(super) const COMPETING_STRIDE: usize = 4;
+pub(super) const FINE_STRIDE: usize = 2;
+
+/// Upper bound of first guesses: gyroscope, steady motion, the eight turns, rest and the way back.
+pub(super) const MAX_GUESSES: usize = 12;
 
 /// When the motion is unknown, turns by this many pixels of the coarsest level are tried in eight directions.
 const SEARCH_PIXELS: f64 = 3.0;
@@ -46,8 +55,18 @@ pub(super) struct FrameTask<'a> {
 pub(super) struct Aligned {
     /// Outcome of the finest level, with the direction of time settled.
     pub(super) outcome: LevelOutcome,
-    /// Linearisations on all levels.
-    pub(super) iterations: usize,
+    /// Work on all levels.
+    pub(super) work: Work,
+}
+
+/// Where the guesses ended on one level.
+struct Round {
+    /// Scores and estimates, best first.
+    finalists: ArrayVec<(f64, Estimate), FINALISTS>,
+    /// Outcome of the best.
+    winner: Option<LevelOutcome>,
+    /// Work of all guesses.
+    work: Work,
 }
 
 impl FrameTask<'_> {
@@ -80,44 +99,58 @@ impl FrameTask<'_> {
         directions.map(move |(x, y)| last.perturbed(&Vector6::new(0.0, 0.0, 0.0, x * angle, y * angle, 0.0)))
     }
 
-    /// Aligns coarse to fine. The guesses compete on the coarsest levels, where an iteration costs next to nothing;
-    /// the best goes on alone.
+    /// Aligns coarse to fine. All guesses compete on the coarsest level, where an iteration costs next to nothing,
+    /// the [`FINALISTS`] on the next; the best goes on alone.
     pub(super) fn run(&self, guesses: &[RigidTransform], scratch: &mut AlignScratch) -> Aligned {
         let coarsest = self.alignment.reference.levels.len().saturating_sub(1);
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
-        let mut iterations = 0;
-        let mut best: Option<(f64, LevelOutcome)> = None;
-        for guess in guesses {
-            let mut outcome = LevelOutcome::unchanged(self.estimate_at(guess));
-            for level in (last_competing..=coarsest).rev() {
-                let mid = outcome.estimate.keyframe_from_camera.mid();
-                let start = Estimate { brightness: outcome.estimate.brightness, ..self.estimate_at(&mid) };
-                outcome = self.level(level, start, scratch);
-                iterations += outcome.iterations;
-            }
-            let score = score(&outcome, self.alignment.reference.keypoints[last_competing].len());
-            if best.as_ref().is_none_or(|(best_score, _)| score < *best_score) {
-                best = Some((score, outcome));
-            }
+        let mut work = Work::none();
+        let mut outcome = LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid));
+        let mut starts: ArrayVec<Estimate, MAX_GUESSES> =
+            guesses.iter().map(|guess| self.estimate_at(guess)).take(MAX_GUESSES).collect();
+        for level in (last_competing..=coarsest).rev() {
+            let round = self.compete(level, &starts, scratch);
+            work += round.work;
+            starts.clear();
+            starts.extend(round.finalists.iter().map(|(_, estimate)| Estimate {
+                brightness: estimate.brightness,
+                ..self.estimate_at(&estimate.keyframe_from_camera.mid())
+            }));
+            outcome = round.winner.unwrap_or(outcome);
         }
-        let mut outcome = best.map_or_else(
-            || LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid)),
-            |(_, outcome)| outcome,
-        );
         for level in (0..last_competing).rev() {
             let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
             outcome = self.level(level, start, scratch);
-            iterations += outcome.iterations;
+            work += outcome.work;
         }
         outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
-        Aligned { outcome, iterations }
+        Aligned { outcome, work }
+    }
+
+    /// Aligns from every start on one level and ranks where they ended.
+    fn compete(&self, level: usize, starts: &[Estimate], scratch: &mut AlignScratch) -> Round {
+        let mut round = Round { finalists: ArrayVec::new(), winner: None, work: Work::none() };
+        for start in starts {
+            let outcome = self.level(level, *start, scratch);
+            round.work += outcome.work;
+            let score = score(&outcome, self.alignment.reference.keypoints[level].len());
+            let rank = round.finalists.iter().take_while(|(other, _)| *other <= score).count();
+            if rank < FINALISTS {
+                round.finalists.truncate(FINALISTS - usize::from(round.finalists.len() == FINALISTS));
+                round.finalists.insert(rank, (score, outcome.estimate));
+            }
+            if rank == 0 {
+                round.winner = Some(outcome);
+            }
+        }
+        round
     }
 
     fn level(&self, level: usize, start: Estimate, scratch: &mut AlignScratch) -> LevelOutcome {
         let competing = level + COMPETING_LEVELS >= self.alignment.reference.levels.len();
         let plan = LevelPlan {
             level,
-            depth_stride: if competing { 4 } else { 2 },
+            depth_stride: if competing { COMPETING_STRIDE } else { FINE_STRIDE },
             min_step: if competing { COMPETING_MIN_STEP } else { self.alignment.settings.min_step },
             max_iterations: self.alignment.settings.max_iterations,
             blur: self.blur,

@@ -1,5 +1,6 @@
 //! The tracker: frames in, poses at shutter opening and closing out.
 
+mod bound;
 mod coarse_to_fine;
 mod config;
 mod frame;

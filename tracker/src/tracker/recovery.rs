@@ -3,13 +3,14 @@
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
-use super::coarse_to_fine::FrameTask;
+use super::coarse_to_fine::{Aligned, FrameTask};
 use super::config::MAX_RECENT_KEYFRAMES;
 use super::history::Motion;
 use crate::align::{AlignScratch, AlignSettings, Alignment, FrameData, ReferenceData};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::keyframe::{Keyframe, typical_inverse_depth};
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 use crate::workspace::{Arena, WorkspaceError};
 
 /// A view counts as found when this share of a keyframe's patches is in view and agrees.
@@ -67,7 +68,7 @@ impl<'m> RecentKeyframes<'m> {
     }
 
     /// Looks for `view` from the poses of the remembered keyframes and the last known pose; returns
-    /// `world_from_camera` at mid exposure.
+    /// `world_from_camera` at mid exposure. What that took is added to `work`.
     #[allow(clippy::too_many_arguments, reason = "borrows disjoint parts of the tracker")]
     pub(super) fn find(
         &self,
@@ -78,6 +79,7 @@ impl<'m> RecentKeyframes<'m> {
         motion: &Motion,
         timestamp: f64,
         scratch: &mut AlignScratch,
+        work: &mut Work,
     ) -> Option<RigidTransform> {
         let mut best: Option<(f32, RigidTransform)> = None;
         for keyframe in &self.slots[..self.filled] {
@@ -108,7 +110,8 @@ impl<'m> RecentKeyframes<'m> {
                 inverse_depth: typical_inverse_depth(finest),
             };
             let guesses = [local.reference_from_mid, RigidTransform::identity()];
-            let outcome = task.run(&guesses, scratch).outcome;
+            let Aligned { outcome, work: spent } = task.run(&guesses, scratch);
+            *work += spent;
             let inliers = outcome.patches as f32 / finest.len().max(1) as f32;
             let fits = outcome.photometric_scale < MAX_RESIDUAL && outcome.depth_scale < MAX_DEPTH_RESIDUAL;
             if fits && inliers > best.map_or(MIN_INLIERS, |(share, _)| share) {

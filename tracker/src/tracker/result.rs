@@ -5,6 +5,7 @@ use nalgebra::SMatrix;
 use crate::align::{LevelOutcome, StopReason, UNKNOWNS};
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 
 /// How far a result can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,8 +61,10 @@ pub struct FrameResult {
     pub blur: f32,
     /// Virtual views on the finest level.
     pub virtual_views: usize,
-    /// Linearisations on all levels.
+    /// Linearisations on all levels, of all attempts.
     pub iterations: usize,
+    /// What the frame took; never more than [`crate::TrackerConfig::work_bound`].
+    pub work: Work,
     /// Robust photometric residual: standard deviations of the nominal noise.
     pub residual: f32,
     /// Share of the keyframe's patches that are in view and agree.
@@ -80,13 +83,12 @@ pub struct FrameResult {
 }
 
 impl FrameResult {
-    /// A result with the figures of an alignment; the rest is that of a lost frame.
+    /// A result with the figures of an alignment; the rest is that of a lost frame that took no work.
     pub(super) fn of(
         index: usize,
         timestamp: f64,
         world_from_camera: ExposureTrajectory,
         outcome: &LevelOutcome,
-        iterations: usize,
     ) -> Self {
         Self {
             index,
@@ -97,7 +99,8 @@ impl FrameResult {
             brightness: outcome.estimate.brightness,
             blur: 0.0,
             virtual_views: outcome.views,
-            iterations,
+            iterations: 0,
+            work: Work::none(),
             residual: outcome.photometric_scale,
             inliers: 0.0,
             depth_residual: outcome.depth_scale,

@@ -21,6 +21,7 @@ use crate::photometric::LuminanceTable;
 use crate::surface::InverseDepthMap;
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 use crate::workspace::Arena;
 
 /// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
@@ -52,6 +53,8 @@ pub struct Tracker<'m> {
     typical: Typical,
     pub(super) last_timestamp: f64,
     pub(super) frames: usize,
+    /// What the current frame took so far.
+    work: Work,
 }
 
 impl<'m> Tracker<'m> {
@@ -93,6 +96,7 @@ impl<'m> Tracker<'m> {
             typical: Typical::default(),
             last_timestamp: f64::NEG_INFINITY,
             frames: 0,
+            work: Work::none(),
         })
     }
 
@@ -102,15 +106,22 @@ impl<'m> Tracker<'m> {
     /// [`FrameError`] when the frame cannot be used at all; the tracker is then unchanged.
     pub fn track(&mut self, frame: &Frame) -> Result<FrameResult, FrameError> {
         self.check(frame)?;
+        self.work = Work { image_pixels: self.pixels(), ..Work::none() };
         self.pyramid.fill(&frame.colour, &self.luminance);
         self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
-        let result = match self.motion {
+        let mut result = match self.motion {
             None => self.start(frame),
             Some(motion) => self.follow(frame, &motion),
         };
         self.last_timestamp = frame.timestamp;
         self.frames += 1;
+        result.work = self.work;
+        result.iterations = self.work.linearisations as usize;
         Ok(result)
+    }
+
+    fn pixels(&self) -> u64 {
+        (self.config.camera.width * self.config.camera.height) as u64
     }
 
     /// Forgets everything but the configuration.
@@ -150,7 +161,7 @@ impl<'m> Tracker<'m> {
             keyframe_from_camera: still,
             brightness: BrightnessModel::default(),
         });
-        let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing, 0);
+        let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.promote(&origin, None, f32::MAX);
         let enough = self.keyframe.finest_keypoints().len() >= MIN_START_KEYPOINTS;
         if enough && self.depth_share >= MIN_START_DEPTH {
@@ -176,7 +187,7 @@ impl<'m> Tracker<'m> {
             aligned = self.align(frame, &start, self.config.align.blur, None);
             status = match self.judge(&aligned.outcome, &start, frame) {
                 FrameStatus::Lost => {
-                    return self.resume(frame, &start.reference_from_mid, aligned.iterations);
+                    return self.resume(frame, &start.reference_from_mid);
                 }
                 _ => FrameStatus::Weak,
             };
@@ -191,13 +202,13 @@ impl<'m> Tracker<'m> {
 
     /// Goes on from a view that was found again near an older keyframe, out of sight of the current one: the frame
     /// becomes the keyframe, and like that of the very first one its motion is learnt from the next frame.
-    fn resume(&mut self, frame: &Frame, world_from_mid: &RigidTransform, iterations: usize) -> FrameResult {
+    fn resume(&mut self, frame: &Frame, world_from_mid: &RigidTransform) -> FrameResult {
         let still = ExposureTrajectory::still(*world_from_mid);
         let nothing = LevelOutcome::unchanged(crate::align::Estimate {
             keyframe_from_camera: still,
             brightness: BrightnessModel::default(),
         });
-        let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing, iterations);
+        let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.keep_keyframe();
         self.promote(world_from_mid, None, f32::MAX);
         self.motion = Some(Motion::still(frame.timestamp, frame.exposure, *world_from_mid));
@@ -278,10 +289,12 @@ impl<'m> Tracker<'m> {
             blur,
             inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),
         };
-        match start {
+        let aligned = match start {
             Some(mid) => task.run(&[mid], &mut self.scratch),
             None => task.run(&task.guesses(), &mut self.scratch),
-        }
+        };
+        self.work += aligned.work;
+        aligned
     }
 
     fn judge(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> FrameStatus {
@@ -319,8 +332,7 @@ impl<'m> Tracker<'m> {
         let world_from_camera =
             outcome.estimate.keyframe_from_camera.seen_from(&self.keyframe.world_from_keyframe);
         let world_from_mid = world_from_camera.mid();
-        let mut result =
-            FrameResult::of(self.frames, frame.timestamp, world_from_camera, outcome, aligned.iterations);
+        let mut result = FrameResult::of(self.frames, frame.timestamp, world_from_camera, outcome);
         result.status = status;
         result.blur = evidence.blur;
         result.inliers = evidence.inliers;
@@ -357,13 +369,7 @@ impl<'m> Tracker<'m> {
         let held = Motion { between_frames: motion.between_frames * 0.5, within_exposure: None, ..*motion };
         self.motion = Some(held);
         let world_from_camera = ExposureTrajectory::still(motion.reference_from_mid);
-        let mut result = FrameResult::of(
-            self.frames,
-            frame.timestamp,
-            world_from_camera,
-            &aligned.outcome,
-            aligned.iterations,
-        );
+        let mut result = FrameResult::of(self.frames, frame.timestamp, world_from_camera, &aligned.outcome);
         result.reference_index = self.keyframe.frame_index;
         result
     }
@@ -387,6 +393,7 @@ impl<'m> Tracker<'m> {
             motion,
             frame.timestamp,
             &mut self.scratch,
+            &mut self.work,
         );
         match found {
             Some(world_from_mid) => {
@@ -423,6 +430,7 @@ impl<'m> Tracker<'m> {
 
     /// Deblurs the keyframe with its own motion and selects its keypoints; `false` if there is nothing to do.
     fn sharpen_keyframe(&mut self) -> bool {
+        self.work.image_pixels += self.pixels();
         let Some(exposure) = self.keyframe.keyframe_from_camera else { return false };
         let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
         if self.config.reference == ReferenceMode::Raw || !worth {
@@ -438,7 +446,8 @@ impl<'m> Tracker<'m> {
         );
         let image = &mut self.keyframe.pyramid.levels[0];
         self.deblur.capture(image.pixels);
-        self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
+        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
+        self.work.blur_taps += report.taps;
         self.keyframe.pyramid.reduce();
         self.select_keypoints();
         true

@@ -121,8 +121,9 @@ impl<'a> MidDepth<'a> {
     fn at(&self, x: [f32; 3]) -> Option<f32> {
         let camera = &self.camera;
         // Half a pixel more, so that cutting off rounds.
-        let u = camera.fx as f32 * x[0] / x[2] + camera.cx as f32 + 0.5;
-        let v = camera.fy as f32 * x[1] / x[2] + camera.cy as f32 + 0.5;
+        let inverse = 1.0 / x[2];
+        let u = camera.fx as f32 * x[0] * inverse + camera.cx as f32 + 0.5;
+        let v = camera.fy as f32 * x[1] * inverse + camera.cy as f32 + 0.5;
         let inside = u >= 0.0 && v >= 0.0 && u < camera.width as f32 && v < camera.height as f32;
         let pixel = if inside { v as usize * camera.width + u as usize } else { usize::MAX };
         self.depth.get(pixel).copied().filter(|depth| *depth > 0.0)
@@ -132,11 +133,11 @@ impl<'a> MidDepth<'a> {
     /// last guess is seen, until that is where it lies. At an edge the guesses go to and fro between two surfaces.
     pub(super) fn guess(&self, mid_from_view: &Motion, slope: [f32; 2], start: f32) -> [f32; 2] {
         let direction = [slope[0], slope[1], 1.0];
-        let forward = mid_from_view.turn(direction)[2];
+        let per_forward = 1.0 / mid_from_view.turn(direction)[2];
         let next = |z: f32| {
             let x = mid_from_view.apply(direction.map(|d| d * z));
             let measured = if x[2] > NEAREST { self.at(x) } else { None };
-            measured.map_or(z, |measured| (z + (measured - x[2]) / forward).max(2.0 * NEAREST))
+            measured.map_or(z, |measured| (z + (measured - x[2]) * per_forward).max(2.0 * NEAREST))
         };
         let second = next(next(start));
         let third = next(second);

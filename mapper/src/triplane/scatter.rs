@@ -1,7 +1,8 @@
 //! Gradients by the values of planes.
 //!
-//! Samples of a ray lie next to each other, and often in one cell: the sums of its four nodes stay in registers until
-//! a sample of another cell comes. One pass over the samples serves both resolutions.
+//! One pass over the samples serves both resolutions. Samples of a ray lie next to each other, mostly in one coarse cell:
+//! the sums of its four nodes stay in registers until a sample of another cell comes. In the fine planes the next
+//! cell comes so often, and so irregularly, that guessing it wrong costs more than going to memory every time.
 
 use fearless_simd::{f32x8, prelude::*};
 
@@ -21,6 +22,32 @@ pub(super) struct PlaneSums<'a> {
     pub(super) sums: &'a mut [f32],
     /// A bit per cell, that of its node with the least coordinates: whether a gradient was added.
     pub(super) cells: &'a mut [u64],
+}
+
+impl PlaneSums<'_> {
+    /// Marks the cell whose node with the least coordinates starts at a float.
+    #[inline(always)]
+    fn touch(&mut self, start: usize) {
+        let node = start / CHANNELS;
+        self.cells[node / 64] |= 1 << (node % 64);
+    }
+
+    /// Adds what one sample gives to the four nodes of its cell.
+    #[inline(always)]
+    fn add<S: Simd>(&mut self, simd: S, cell: Cell, columns: usize, gradient: &[f32]) {
+        for (row, weights) in weights(cell.place).as_chunks::<2>().0.iter().enumerate() {
+            let start = cell.start + row * columns * CHANNELS;
+            let (nodes, _) = self.sums[start..start + 2 * CHANNELS].as_chunks_mut::<CHANNELS>();
+            for (node, weight) in nodes.iter_mut().zip(weights) {
+                let vectors = node.as_chunks_mut::<LANES>().0.iter_mut();
+                for (sums, gradient) in vectors.zip(gradient.as_chunks::<LANES>().0) {
+                    let gradient = f32x8::load_array_ref(simd, gradient);
+                    gradient.mul_add(*weight, f32x8::load_array_ref(simd, sums)).store_array(sums);
+                }
+            }
+        }
+        self.touch(cell.start);
+    }
 }
 
 /// Sums of the four nodes of a cell.
@@ -59,8 +86,7 @@ impl<S: Simd> Corners<S> {
                 (*sum + f32x8::load_array_ref(simd, node)).store_array(node);
             }
         }
-        let node = self.start / CHANNELS;
-        out.cells[node / 64] |= 1 << (node % 64);
+        out.touch(self.start);
     }
 }
 
@@ -76,29 +102,27 @@ pub(super) fn by_plane<S: Simd>(
 ) {
     let columns = levels.each_ref().map(|planes| planes.columns(plane));
     let mut cells = [Cells::NONE; 2];
-    let mut corners = [Corners::at(simd, NOWHERE), Corners::at(simd, NOWHERE)];
+    let [coarse, fine] = out;
+    let mut corners = Corners::at(simd, NOWHERE);
     for start in (0..points[0].len()).step_by(TILE) {
         let points = tile(points, start);
         for (cells, planes) in cells.iter_mut().zip(levels) {
             cells.find(simd, planes, points, [plane]);
         }
-        cells[1].prefetch(out[1].sums, plane, columns[1], points[0].len());
+        cells[1].prefetch(fine.sums, plane, columns[1], points[0].len());
         let gradients = &by_features[start..start + points[0].len()];
         for (point, gradient) in gradients.iter().take(TILE).enumerate() {
-            for level in 0..2 {
-                let Cell { start, place } = cells[level].at(point, plane);
-                if start != corners[level].start {
-                    corners[level].store(simd, columns[level], &mut out[level]);
-                    corners[level] = Corners::at(simd, start);
-                }
-                let gradient = &gradient[level * CHANNELS..(level + 1) * CHANNELS];
-                corners[level].add(simd, gradient, weights(place));
+            let (of_coarse, of_fine) = gradient.split_at(CHANNELS);
+            let Cell { start, place } = cells[0].at(point, plane);
+            if start != corners.start {
+                corners.store(simd, columns[0], coarse);
+                corners = Corners::at(simd, start);
             }
+            corners.add(simd, of_coarse, weights(place));
+            fine.add(simd, cells[1].at(point, plane), columns[1], of_fine);
         }
     }
-    for level in 0..2 {
-        corners[level].store(simd, columns[level], &mut out[level]);
-    }
+    corners.store(simd, columns[0], coarse);
 }
 
 /// From the cells of a plane with `columns` nodes in a row to their nodes: a bit per node.

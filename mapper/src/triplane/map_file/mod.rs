@@ -52,6 +52,8 @@ mod tests {
     use std::fs;
     use std::path::PathBuf;
 
+    use mba_tracker::simd::Level;
+
     use super::*;
     use crate::BinaryFileError;
     use crate::triplane::TriplaneField;
@@ -87,6 +89,14 @@ mod tests {
                 assert!(again.0.iter().zip(&field.0).all(|(a, b)| (a - b).abs() <= 0.51 * step + 1e-6));
             }
         }
+        let at = |k: usize| [0.0011, 0.0009, 0.0006].map(|step| (k * 131 % 1009) as f64 * step);
+        let origin = field.region.origin();
+        let points: Vec<[f64; 3]> =
+            (0..500).map(|k| [0, 1, 2].map(|axis| origin[axis] + at(k)[axis])).collect();
+        let [before, after] = [&field, &again].map(|field| field.colours(Level::new(), &points));
+        let pairs = before.as_flattened().iter().zip(after.as_flattened());
+        let off = pairs.map(|(a, b)| 255.0 * (a - b).abs()).fold(0.0, f32::max);
+        assert!(off < 0.01, "a colour is off by {off} levels");
         // What was read is written as it was.
         let first = fs::read(&path).unwrap();
         write_field(&path, &again).unwrap();

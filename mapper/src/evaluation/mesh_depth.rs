@@ -128,19 +128,29 @@ mod tests {
         }
     }
 
+    /// Both walls in one mesh.
+    fn walls(one: &Mesh, other: &Mesh) -> Mesh {
+        let moved = other.triangles.iter().map(|corners| corners.map(|corner| corner + 4));
+        Mesh {
+            vertices: [&one.vertices[..], &other.vertices[..]].concat(),
+            triangles: one.triangles.iter().copied().chain(moved).collect(),
+            ..Mesh::default()
+        }
+    }
+
     #[test]
     fn pixels_weigh_alike_and_only_where_both_have_a_surface() {
-        // Both views see the right half of the estimate. The first has all of the reference in view, the second, where the
-        // estimate is behind the camera, too; from the third, which looks past it, nothing is seen.
-        let views = [at(0.0, 0.0), at(0.0, 2.5), at(90.0, 0.0)];
-        let mut reference = wall(-8.0, 2.0);
-        let far = wall(-8.0, 4.0);
-        reference.vertices.extend(&far.vertices);
-        reference.triangles.extend([[4, 5, 6], [4, 6, 7]]);
-        let figures = evaluate_mesh_depth(&reference, &wall(0.0, 2.25), &CAMERA, &views).unwrap();
-        assert_eq!(figures, MeshDepthFigures { views: 3, l1_cm: Some(25.0), covered_share: 0.25 });
-        let figures = evaluate_mesh_depth(&reference, &wall(0.0, 2.25), &CAMERA, &views[1..]).unwrap();
-        assert_eq!(figures, MeshDepthFigures { views: 2, l1_cm: None, covered_share: 0.0 });
+        let reference = walls(&wall(-8.0, 2.0), &wall(-8.0, 4.0));
+        let estimate = walls(&wall(0.0, 2.25), &wall(0.0, 4.5));
+        // The first sees the near walls, of the estimate's in half of its 1200 pixels. The second, between near and far
+        // ones, sees the far ones everywhere. The third looks past all of them.
+        let views = [at(0.0, 0.0), at(3.0, 2.5), at(90.0, 0.0)];
+        let figures = evaluate_mesh_depth(&reference, &estimate, &CAMERA, &views).unwrap();
+        let expected = (600.0 * 25.0 + 1200.0 * 50.0) / 1800.0;
+        assert!((figures.l1_cm.unwrap() - expected).abs() < 1e-9, "{figures:?}");
+        assert_eq!((figures.views, figures.covered_share), (3, 0.75));
+        let figures = evaluate_mesh_depth(&reference, &estimate, &CAMERA, &[at(-3.0, 0.0)]).unwrap();
+        assert_eq!(figures, MeshDepthFigures { views: 1, l1_cm: None, covered_share: 0.0 });
     }
 
     #[test]

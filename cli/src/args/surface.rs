@@ -50,7 +50,13 @@ within the threshold of the estimate, F1 their harmonic mean; accuracy and compl
 Both files have to be in one frame: `mba mesh --align` writes such meshes. For others, --align moves the estimate from \
 the world of a run to that of a trajectory of the same frames.
 
+Depth L1 is what cameras see of the difference: with --views, depth images of both meshes (320x240 pixels, 60 degrees \
+wide) are made from up to 100 poses, evenly chosen from a trajectory in the frame of the reference. It is the mean \
+absolute difference over the pixels where both have a surface; the share of the reference's pixels where the estimate \
+has one is printed with it. Both files need triangles for that.
+
 Examples:
+  mba eval mesh --reference scene.ply --estimate mesh.ply --views data/groundtruth.txt
   mba eval mesh --reference data/surface_points.ply --estimate mesh.ply --threshold-cm 1,2,5
   mba eval mesh --reference data/surface_points.ply --estimate mesh.ply --align data/groundtruth.txt --trajectory run")]
 pub struct EvalMesh {
@@ -72,6 +78,9 @@ pub struct EvalMesh {
     /// Largest time difference of frames matched for --align, in seconds
     #[arg(long, value_name = "S", default_value_t = DEFAULT_MAX_DT, value_parser = non_negative)]
     pub max_dt: f64,
+    /// Trajectory from whose poses depth images of both meshes are compared, in the frame of the reference
+    #[arg(long, value_name = "TRAJECTORY")]
+    pub views: Option<PathBuf>,
     /// Move the estimate onto the reference by the surfaces too (points within 10 cm); hides errors of its pose
     #[arg(long)]
     pub icp: bool,

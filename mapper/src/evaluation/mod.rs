@@ -10,6 +10,7 @@ mod figures;
 mod icp;
 mod image;
 mod kd_tree;
+mod mesh_depth;
 mod pose_alignment;
 mod statistics;
 mod structural_similarity;
@@ -23,6 +24,7 @@ pub use figures::{BlurFigures, TrajectoryFigures};
 pub use icp::refine_by_icp;
 pub use image::{DepthDifference, ImageError, depth_difference, psnr, ssim};
 pub use kd_tree::KdTree;
+pub use mesh_depth::{MeshDepthError, MeshDepthFigures, evaluate_mesh_depth};
 pub use pose_alignment::{PoseAlignment, PoseAlignmentError, align_poses};
 pub use statistics::{Statistics, quantile, share_within};
 #[cfg(test)]

@@ -2,9 +2,11 @@
 //!
 //! A [`Mesh`] comes from what cameras see of a map ([`ViewSource`], for Gaussians [`MapViews`]) by [`fuse_views`], or
 //! from a signed distance that is known everywhere by [`mesh_from_field`]. [`Sight`] drops what no camera has seen and
-//! gives colours to the rest; [`surface_of_views`] does all of that, and [`surface_of_field`] for a tri-plane field.
+//! gives colours to the rest; [`surface_of_views`] does all of that, and [`surface_of_field`] for a tri-plane field. The
+//! other way round, [`depth_image`] is what a camera sees of a mesh.
 
 mod components;
+mod depth_image;
 mod error;
 mod field;
 mod map_views;
@@ -18,6 +20,7 @@ mod tsdf;
 mod view;
 
 pub use crate::ply::PlyError;
+pub use depth_image::depth_image;
 pub use error::SurfaceError;
 pub use field::{FieldBox, mesh_from_field};
 pub use map_views::MapViews;

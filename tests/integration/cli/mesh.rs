@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mba_mapper::gaussians::{Gaussian, Gaussians};
 use mba_mapper::run::{FrameStatus, RunCamera};
-use mba_mapper::surfaces::read_mesh;
+use mba_mapper::surfaces::{Mesh, read_mesh, write_mesh};
 use mba_mapper::trajectory_file::{TimedPose, write_trajectory};
 use mba_tests::still_run;
 use mba_tracker::geometry::RigidTransform;
@@ -150,6 +150,62 @@ fn icp_moves_the_estimate_onto_the_reference() {
     let refined = eval(place.path(), "shifted.ply", &["--threshold-cm", "0.1", "--icp"]).json();
     assert_eq!(number(&refined, "/thresholds/0/f1"), 1.0);
     assert!((number(&refined, "/icp/translation_cm") - 3.0).abs() < 1e-2, "{refined}");
+}
+
+/// Writes a part of the plane of depth `z` in the world of the run, from x = `left` to 3 m, moved by `moved`.
+fn write_plane(place: &Path, name: &str, left: f32, z: f64, moved: &RigidTransform) {
+    let z = z as f32;
+    let mut plane = Mesh {
+        vertices: vec![[left, -3.0, z], [3.0, -3.0, z], [3.0, 3.0, z], [left, 3.0, z]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    plane.transform(moved);
+    write_mesh(&place.join(name), &plane).unwrap();
+}
+
+/// `mba eval mesh` with `reference` and `estimate` in views from the poses of `views`.
+fn eval_views(place: &Path, names: [&str; 3], options: &[&str]) -> Outcome {
+    let files = [("--reference", names[0]), ("--estimate", names[1]), ("--views", names[2])];
+    command(place, &["eval", "mesh", "--samples", "1000"], &files, options)
+}
+
+#[test]
+fn depth_is_compared_as_cameras_see_it() {
+    let place = workplace();
+    let place = place.path();
+    write_plane(place, "truth.ply", -3.0, WALL, &truth_from_run());
+    // In the world of the run: views have to be made after it is aligned.
+    write_plane(place, "behind.ply", 0.1, WALL + 0.02, &RigidTransform::identity());
+    let [truth, run] =
+        ["groundtruth.txt", "run"].map(|name| place.join(name).into_os_string().into_string().unwrap());
+    let align = ["--align", &truth, "--trajectory", &run];
+    let figures = eval_views(place, ["truth.ply", "behind.ply", "groundtruth.txt"], &align).json();
+    assert_eq!(number(&figures, "/depth/views"), 3.0);
+    assert!((number(&figures, "/depth/l1_cm") - 2.0).abs() < 1e-3, "{figures}");
+    // The third camera sees nothing. To the left of the estimate are for the first x < 0.2 / 2.02 and for the second
+    // x < 0 at unit depth, with a focal length of 160 / tan 30 degrees and 159.5 in the middle: 187 and 160 columns.
+    let expected = f64::from(133 + 160) / 640.0;
+    assert!((number(&figures, "/depth/covered_share") - expected).abs() < 1e-12, "{figures}");
+    let plain = eval(place, "behind.ply", &[]).json();
+    assert_eq!(plain.get("depth"), None);
+}
+
+#[test]
+fn views_that_cannot_be_made_are_named() {
+    let place = workplace();
+    let place = place.path();
+    write_plane(place, "truth.ply", -3.0, WALL, &truth_from_run());
+    let refused = |names: [&str; 3], parts: &[&str]| eval_views(place, names, &[]).assert_error(2, parts);
+    refused(["points.ply", "truth.ply", "groundtruth.txt"], &["points.ply has no triangles"]);
+    refused(["truth.ply", "points.ply", "groundtruth.txt"], &["points.ply has no triangles"]);
+    refused(["truth.ply", "truth.ply", "absent.txt"], &["absent.txt"]);
+    fs::write(place.join("views.txt"), "# none\n").unwrap();
+    refused(["truth.ply", "truth.ply", "views.txt"], &["views.txt holds no poses"]);
+    fs::write(place.join("views.txt"), "0 99 99 99 0 0 0 1\n").unwrap();
+    refused(["truth.ply", "truth.ply", "views.txt"], &["the reference is in none of 1 views"]);
+    fs::write(place.join("views.txt"), "0 0 0 0 0 0 0 2\n").unwrap();
+    refused(["truth.ply", "truth.ply", "views.txt"], &["views.txt, line 1", "length 2"]);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 use super::depth_term::DepthProblem;
 use super::prior::MotionPrior;
 use super::{AlignSettings, Estimate, UNKNOWNS};
-use crate::geometry::PinholeCamera;
+use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{GreyLevel, PixelRectangle};
 use crate::keyframe::Keypoint;
 use crate::surface::{InverseDepthMap, SurfacePlanes};
@@ -138,9 +138,13 @@ impl Objective<'_> {
         if let Some(depth) = &self.depth {
             self.add_depth(depth, trajectory, expected_counts.map(|counts| counts.1), &mut sums);
         }
-        let change = centre_motion_from_left(trajectory);
-        sums.hessian = change.transpose() * sums.hessian * change;
-        sums.gradient = change.transpose() * sums.gradient;
+        // The matrix is symmetric: what is done to its rows is done to its columns after transposing it.
+        let ends = [&trajectory.start, &trajectory.end].map(RigidTransform::rotation_matrix);
+        for _ in 0..2 {
+            rows_by_centre_and_motion(&ends, &mut sums.hessian);
+            sums.hessian.transpose_mut();
+        }
+        rows_by_centre_and_motion(&ends, &mut sums.gradient);
         self.add_priors(estimate, &mut sums);
         sums
     }
@@ -157,14 +161,16 @@ impl Objective<'_> {
             depth.problem.linearise(self.simd, &trajectory.mid(), depth.sigma, self.settings.huber);
         let compared = depth_sums.points + depth_sums.gated;
         let weight = depth.weight * expected_points.map_or(1.0, |expected| count_ratio(expected, compared));
-        let to_ends = mid_from_ends(trajectory);
+        let blend = trajectory.rotation_blend_left(0.5);
         sums.cost += weight * depth_sums.cost;
         sums.depth_points = depth_sums.points;
         sums.depth_compared = compared;
         let mut block = sums.hessian.fixed_view_mut::<12, 12>(0, 0);
-        block += to_ends.transpose() * depth_sums.hessian * to_ends * weight;
+        // Symmetric: the columns are spread like the rows, after transposing.
+        let spread = rows_by_ends(&blend, &(depth_sums.hessian * weight)).transpose();
+        block += rows_by_ends(&blend, &spread);
         let mut rows = sums.gradient.fixed_rows_mut::<12>(0);
-        rows += to_ends.transpose() * depth_sums.gradient * weight;
+        rows += rows_by_ends(&blend, &(depth_sums.gradient * weight));
     }
 
     fn photometric(&self, estimate: &Estimate, costs: &mut [PatchCost]) -> PhotometricSums {
@@ -216,24 +222,83 @@ fn count_ratio(expected: f64, count: f64) -> f64 {
     if count > 0.0 { expected / count } else { 1.0 }
 }
 
-/// Derivative of the mid pose's left tangent by the left tangents of both ends.
-fn mid_from_ends(trajectory: &ExposureTrajectory) -> SMatrix<f64, 6, 12> {
-    let blend = trajectory.rotation_blend_left(0.5);
-    let mut m = SMatrix::<f64, 6, 12>::zeros();
-    m.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(0.5);
-    m.fixed_view_mut::<3, 3>(0, 6).fill_diagonal(0.5);
-    m.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Matrix3::identity() - blend));
-    m.fixed_view_mut::<3, 3>(3, 9).copy_from(&blend);
-    m
+/// Turns rows that belong to the mid pose's left tangent into those of the left tangents of both ends, where
+/// `blend` is the part of the end in the mid rotation: multiplies by the transpose of
+/// `(I/2, 0, I/2, 0; 0, I - B, 0, B)` without the products with zero and one.
+fn rows_by_ends<const COLUMNS: usize>(
+    blend: &Matrix3<f64>,
+    mid: &SMatrix<f64, 6, COLUMNS>,
+) -> SMatrix<f64, 12, COLUMNS> {
+    let translation = mid.fixed_rows::<3>(0) * 0.5;
+    let turn = mid.fixed_rows::<3>(3);
+    let end_turn = blend.transpose() * turn;
+    let mut ends = SMatrix::<f64, 12, COLUMNS>::zeros();
+    ends.fixed_rows_mut::<3>(0).copy_from(&translation);
+    ends.fixed_rows_mut::<3>(3).copy_from(&(turn - end_turn));
+    ends.fixed_rows_mut::<3>(6).copy_from(&translation);
+    ends.fixed_rows_mut::<3>(9).copy_from(&end_turn);
+    ends
 }
 
-/// Derivative of (start, end) left tangents by (centre, motion) right tangents; gain and offset pass through.
-fn centre_motion_from_left(trajectory: &ExposureTrajectory) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
-    let mut change = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
-    for (row, end, half) in [(0, &trajectory.start, -0.5), (6, &trajectory.end, 0.5)] {
-        let left = crate::trajectory::left_from_right(&end.rotation_matrix());
-        change.fixed_view_mut::<6, 6>(row, 0).copy_from(&left);
-        change.fixed_view_mut::<6, 6>(row, 6).copy_from(&(left * half));
+/// Turns rows that belong to (start, end) left tangents, at the rotations `ends`, into those of (centre, motion)
+/// right tangents; gain and offset stay. With `R` the rotation of an end, the left turn is `R` times the right one;
+/// start and end are `centre -+ motion/2`.
+fn rows_by_centre_and_motion<const COLUMNS: usize>(
+    ends: &[Matrix3<f64>; 2],
+    rows: &mut SMatrix<f64, UNKNOWNS, COLUMNS>,
+) {
+    for (row, rotation) in [3, 9].into_iter().zip(ends) {
+        let turned = rotation.transpose() * rows.fixed_rows::<3>(row);
+        rows.fixed_rows_mut::<3>(row).copy_from(&turned);
     }
-    change
+    for column in 0..COLUMNS {
+        for row in 0..6 {
+            let (start, end) = (rows[(row, column)], rows[(row + 6, column)]);
+            rows[(row, column)] = start + end;
+            rows[(row + 6, column)] = 0.5 * (end - start);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A symmetric matrix without any other structure.
+    fn symmetric<const N: usize>() -> SMatrix<f64, N, N> {
+        SMatrix::from_fn(|i, j| 1.0 + 0.1 * (i * j) as f64 + 0.37 * (i + j) as f64 % 1.0)
+    }
+
+    fn turns() -> [Matrix3<f64>; 2] {
+        let turn = |x, y, z| crate::geometry::so3::exp_matrix(&nalgebra::Vector3::new(x, y, z));
+        [turn(0.3, -0.5, 0.2), turn(-0.1, 0.4, 0.3)]
+    }
+
+    #[test]
+    fn centre_and_motion_are_the_product_with_the_change_of_coordinates() {
+        let ends = turns();
+        let mut change = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
+        for (row, end, half) in [(0, &ends[0], -0.5), (6, &ends[1], 0.5)] {
+            let left = crate::trajectory::left_from_right(end);
+            change.fixed_view_mut::<6, 6>(row, 0).copy_from(&left);
+            change.fixed_view_mut::<6, 6>(row, 6).copy_from(&(left * half));
+        }
+        let mut rows = symmetric::<UNKNOWNS>();
+        let expected = change.transpose() * rows;
+        rows_by_centre_and_motion(&ends, &mut rows);
+        assert!((rows - expected).norm() < 1e-12 * expected.norm());
+    }
+
+    #[test]
+    fn both_ends_are_the_product_with_the_blend() {
+        let blend = turns()[0] * 0.5;
+        let mut mid_from_ends = SMatrix::<f64, 6, 12>::zeros();
+        mid_from_ends.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(0.5);
+        mid_from_ends.fixed_view_mut::<3, 3>(0, 6).fill_diagonal(0.5);
+        mid_from_ends.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Matrix3::identity() - blend));
+        mid_from_ends.fixed_view_mut::<3, 3>(3, 9).copy_from(&blend);
+        let mid = symmetric::<6>();
+        let expected = mid_from_ends.transpose() * mid;
+        assert!((rows_by_ends(&blend, &mid) - expected).norm() < 1e-12 * expected.norm());
+    }
 }

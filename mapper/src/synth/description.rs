@@ -59,6 +59,7 @@ Response {response}, gain {gain}, image noise: {noise}. Depth: {depth}.
 * sharp/: the view at mid exposure without blur and noise, same gain and response.
 * heldout_views/: sharp views without noise from poses.txt (camera-to-world), between the frames and a little
   beside the camera's path; image NNNNNN is line NNNNNN of the poses, counted from zero.
+* surface_points.ply: points of the true surface that frames see, about 1 cm apart, world.
 * depth/: along the optical axis at mid exposure, 16 bit, 5000 units per metre, 0 = missing.
 * groundtruth.txt: camera-to-world at mid exposure; groundtruth_exposure.txt: at opening, mid exposure, closing.
   Between them the camera moves on a smooth path that is not exactly linear.

@@ -33,6 +33,7 @@ mod scene;
 mod sequence;
 #[cfg(test)]
 mod sequence_tests;
+mod surface;
 mod view;
 mod writer;
 

@@ -7,8 +7,9 @@ use super::blur::{self, BlurFigure, ExposurePoses};
 use super::develop::Developer;
 use super::heldout;
 use super::motion::{CameraPath, Steady};
-use super::render::{self, Size, SubFrame, TURNED_GRID};
+use super::render::{self, DepthSample, Size, SubFrame, TURNED_GRID};
 use super::scene::Scene;
+use super::surface;
 use super::view::View;
 use super::{CameraMotion, SynthConfig, SynthError};
 use crate::dataset::RgbdFrame;
@@ -185,6 +186,25 @@ impl SynthSequence {
     #[must_use]
     pub fn heldout_poses(&self) -> Vec<TimedPose> {
         heldout::poses(self)
+    }
+
+    /// Points of the true surface that frames see at mid exposure: world, metres, about a centimetre apart where pixels
+    /// are that dense; meshes can be judged by them.
+    #[must_use]
+    pub fn surface_points(&self) -> Vec<[f32; 3]> {
+        surface::points(self)
+    }
+
+    /// The points of the world that the pixels of frame `index` see at mid exposure, without noise.
+    pub(super) fn seen_points(&self, index: usize) -> Vec<[f32; 3]> {
+        let world_from_camera = self.world_from_camera(self.timestamp(index));
+        let samples = render::depth(&self.scene, self.size(), &View::new(&self.camera, &world_from_camera));
+        let point = |(pixel, sample): (usize, &DepthSample)| {
+            let [u, v] = [pixel % self.camera.width, pixel / self.camera.width];
+            let ray = self.camera.ray(u as f64, v as f64);
+            world_from_camera.transform_point(&(ray * f64::from(sample.depth))).map(|x| x as f32).into()
+        };
+        samples.iter().enumerate().map(point).collect()
     }
 
     fn render_depth(&self, index: usize) -> Vec<u16> {

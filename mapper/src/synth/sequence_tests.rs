@@ -1,5 +1,7 @@
 //! Checks of whole sequences against what geometry and optics say about them.
 
+use std::collections::HashSet;
+
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
@@ -215,6 +217,28 @@ fn shared_and_near(sequence: &SynthSequence, from: usize, to: usize) -> (f64, f6
     let near = (0..depth.len()).filter(|pixel| (0.4..8.0).contains(&metres(*pixel))).count();
     let share = |count: usize| count as f64 / depth.len() as f64;
     (share((0..depth.len()).filter(is_seen).count()), share(near))
+}
+
+#[test]
+fn every_pixel_sees_a_surface_point_nearby_and_none_is_twice_there() {
+    let sequence = sequence(SynthConfig { depth: DepthSensor::Exact, ..small() });
+    let points = sequence.surface_points();
+    let cell = |point: &[f32; 3]| point.map(|x| (x / 0.01).floor() as i32);
+    let cells: HashSet<[i32; 3]> = points.iter().map(cell).collect();
+    assert_eq!(cells.len(), points.len());
+    let camera = sequence.camera();
+    for index in [0, sequence.len() - 1] {
+        let frame = sequence.render_frame(index);
+        for pixel in (0..camera.width * camera.height).step_by(97) {
+            let ray = camera.ray((pixel % camera.width) as f64, (pixel / camera.width) as f64);
+            let depth = f64::from(frame.depth[pixel]) / 5000.0;
+            let expected = frame.world_from_camera.transform_point(&(ray * depth));
+            let distance = |point: &[f32; 3]| (Vector3::from(point.map(f64::from)) - expected).norm();
+            let nearest = points.iter().map(distance).fold(f64::INFINITY, f64::min);
+            // The diagonal of a cell, and a step of the stored depth.
+            assert!(nearest < 0.01 * 3.0_f64.sqrt() + 3e-4, "{nearest} m");
+        }
+    }
 }
 
 #[test]

@@ -11,6 +11,7 @@ use image::{ImageBuffer, Luma, PixelWithColorType, Rgb};
 use rayon::prelude::*;
 
 use super::{BlurFigure, SynthError, SynthSequence, description};
+use crate::surfaces::{Mesh, write_mesh};
 use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory};
 
 /// What was written.
@@ -38,8 +39,11 @@ const GYRO_HERTZ: f64 = 200.0;
 /// Folder of the views that no frame sees.
 const HELDOUT_FOLDER: &str = "heldout_views";
 
+/// File of points of the true surface.
+const SURFACE_FILE: &str = "surface_points.ply";
+
 /// Renders the sequence into `folder` in the native layout (TUM lists, `calibration.toml`) with ground truth,
-/// sharp images, held-out views, blur figures, gyroscope rates and a README. Calls `progress(done, frames)` after each frame, from
+/// sharp images, held-out views, points of the true surface, blur figures, gyroscope rates and a README. Calls `progress(done, frames)` after each frame, from
 /// any thread and in any order.
 ///
 /// The folder is made if it does not exist. The calibration is written last, so that a folder with it is complete.
@@ -64,6 +68,8 @@ pub fn write_dataset(
     let summary = summarise(&written);
     write_ground_truth(sequence, folder)?;
     write_heldout_views(sequence, folder)?;
+    let surface = Mesh { vertices: sequence.surface_points(), ..Mesh::default() };
+    write_mesh(&folder.join(SURFACE_FILE), &surface)?;
     let texts = [
         ("rgb.txt", image_list(sequence, "rgb")),
         ("depth.txt", image_list(sequence, "depth")),

@@ -8,8 +8,8 @@ use super::{Mesh, SurfaceError};
 /// Layers of cells that are in memory at once, and cells across a box of one task.
 const SLAB: usize = 16;
 
-/// Memory that a slab may take, megabytes.
-const LIMIT_MB: usize = 1024;
+/// Memory that a slab, or what is kept of a whole grid, may take, megabytes.
+pub(super) const LIMIT_MB: usize = 1024;
 
 /// Vertices whose colours are asked for at once.
 const BATCH: usize = 4096;

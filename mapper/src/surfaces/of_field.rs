@@ -3,6 +3,7 @@
 use mba_tracker::photometric::InverseResponse;
 use mba_tracker::simd::Level;
 
+use super::field::LIMIT_MB;
 use super::{FieldBox, Mesh, Sight, SurfaceError, Trim, ViewSource, mesh_from_field};
 use crate::deblurring::ForwardResponse;
 use crate::triplane::TriplaneField;
@@ -61,6 +62,7 @@ struct NearSurface {
     /// Voxels along an edge of a block.
     edge: usize,
     blocks: [usize; 3],
+    /// A byte per block.
     near: Vec<bool>,
 }
 
@@ -70,7 +72,11 @@ impl NearSurface {
         let truncation = f64::from(field.settings().truncation);
         let edge = ((BLOCK * truncation / bounds.voxel) as usize).max(1);
         let blocks = points.map(|points| (points - 1).div_ceil(edge));
-        let near = Vec::with_capacity(blocks.iter().product());
+        let count: usize = blocks.iter().product();
+        if count > LIMIT_MB << 20 {
+            return Err(SurfaceError::TooFine { voxel: bounds.voxel, limit_mb: LIMIT_MB });
+        }
+        let near = Vec::with_capacity(count);
         let mut found = Self { bounds: *bounds, edge, blocks, near };
         let mut below = found.corners(field, level, 0);
         for z in 0..blocks[2] {

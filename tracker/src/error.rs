@@ -28,6 +28,13 @@ pub enum FrameError {
         /// Timestamp of this frame, seconds.
         got: f64,
     },
+    /// The time of the depth image is not finite or more than 0.2 s from that of the colour image.
+    DepthTimestamp {
+        /// Timestamp of the colour image, seconds.
+        frame: f64,
+        /// Timestamp of the depth image, seconds.
+        got: f64,
+    },
     /// A pose is not finite or its quaternion not of unit length.
     Pose,
     /// The exposure time is negative or not finite.
@@ -46,6 +53,9 @@ impl fmt::Display for FrameError {
             }
             Self::Timestamp { previous, got } => {
                 write!(f, "timestamp {got:.6} s does not follow {previous:.6} s")
+            }
+            Self::DepthTimestamp { frame, got } => {
+                write!(f, "depth of {got:.6} s does not belong to the image of {frame:.6} s")
             }
             Self::Pose => f.write_str("pose is not finite or its quaternion not of unit length"),
             Self::Exposure { got } => write!(f, "exposure of {got} s is not a duration"),

@@ -36,6 +36,7 @@
 //! let result = tracker.track(&Frame {
 //!     timestamp: 0.0,
 //!     exposure: 0.016,
+//!     depth_timestamp: 0.0,
 //!     colour: ColourView::new(&grey, 160, 120, 160, PixelFormat::Grey8)?,
 //!     depth: DepthView::new(&depth, 160, 120, 160)?,
 //!     angular_velocity: None,
@@ -82,7 +83,7 @@ pub mod workspace;
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;
 pub use tracker::{
-    Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, ReferenceMode, ReferenceView, Revision,
-    Tracker, TrackerConfig, WorkspacePlan, workspace_len,
+    Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, ReferenceView,
+    Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,
 };
 pub use work::Work;

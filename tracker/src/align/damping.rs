@@ -2,7 +2,7 @@
 
 use nalgebra::{SMatrix, SVector};
 
-use super::UNKNOWNS;
+use super::{BOWED_UNKNOWNS, UNKNOWNS};
 
 /// Damping factor and how fast it grows on failure (Nielsen's rule).
 #[derive(Clone, Copy, Debug)]
@@ -24,12 +24,14 @@ impl Damping {
     /// Solves `(H + mu diag(H)) step = -g`, always from the undamped matrix. `None` when that is singular.
     pub(super) fn step(
         &self,
-        hessian: &SMatrix<f64, UNKNOWNS, UNKNOWNS>,
-        gradient: &SVector<f64, UNKNOWNS>,
-    ) -> Option<SVector<f64, UNKNOWNS>> {
+        hessian: &SMatrix<f64, BOWED_UNKNOWNS, BOWED_UNKNOWNS>,
+        gradient: &SVector<f64, BOWED_UNKNOWNS>,
+    ) -> Option<SVector<f64, BOWED_UNKNOWNS>> {
         let mut damped = *hessian;
-        let floor = 1e-9 * hessian.trace() / UNKNOWNS as f64;
-        for i in 0..UNKNOWNS {
+        // Of the unknowns that every frame has.
+        let trace: f64 = (0..UNKNOWNS).map(|i| hessian[(i, i)]).sum();
+        let floor = 1e-9 * trace / UNKNOWNS as f64;
+        for i in 0..BOWED_UNKNOWNS {
             damped[(i, i)] += self.factor * hessian[(i, i)] + floor;
         }
         let step = damped.cholesky()?.solve(&-gradient);

@@ -13,6 +13,7 @@ use super::scale::{SIGMA_PER_MEDIAN_ABSOLUTE, median};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::math::round_half_up_to_i32;
 use crate::surface::{InverseDepthMap, SurfacePlanes, spread_limit};
+use crate::transfer::RowBand;
 
 /// Inputs of the depth term.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +31,8 @@ pub struct DepthProblem<'a> {
     /// Residuals beyond this many 1/m belong to another surface: they cost as much as one at the gate and pull
     /// nowhere.
     pub gate: f32,
+    /// Rows of the current map that take part: those that were measured at the pose in question.
+    pub band: RowBand,
 }
 
 /// One compared point.
@@ -61,15 +64,24 @@ impl DepthProblem<'_> {
     /// Robust standard deviation of the residuals at `keyframe_from_camera`, 1/m, and the number of points behind
     /// it; `scratch` bounds the number of residuals that are looked at.
     pub fn noise_scale(&self, keyframe_from_camera: &RigidTransform, scratch: &mut [f32]) -> (f32, usize) {
+        let count = self.absolute_residuals(keyframe_from_camera, scratch);
+        (noise_of(&mut scratch[..count]), count)
+    }
+
+    /// Writes the magnitudes of the residuals at `keyframe_from_camera`, 1/m, as many as fit; returns their number.
+    pub(super) fn absolute_residuals(
+        &self,
+        keyframe_from_camera: &RigidTransform,
+        magnitudes: &mut [f32],
+    ) -> usize {
         let mut count = 0;
-        let capacity = scratch.len();
         self.for_each_sample(keyframe_from_camera, |sample| {
-            if count < capacity {
-                scratch[count] = sample.residual.abs();
+            if let Some(magnitude) = magnitudes.get_mut(count) {
+                *magnitude = sample.residual.abs();
                 count += 1;
             }
         });
-        (SIGMA_PER_MEDIAN_ABSOLUTE * median(&mut scratch[..count]), count)
+        count
     }
 
     /// Robust cost and normal equations at `keyframe_from_camera` (mid exposure) for residuals of standard
@@ -129,7 +141,8 @@ impl DepthProblem<'_> {
         let (cx, cy) = (self.camera.cx as f32, self.camera.cy as f32);
         let (inverse_fx, inverse_fy) = (1.0 / fx, 1.0 / fy);
         let width = self.current.width;
-        for v in (0..self.current.height).step_by(self.stride) {
+        let first = self.band.first.next_multiple_of(self.stride);
+        for v in (first..self.band.end.min(self.current.height)).step_by(self.stride) {
             let y = (v as f32 - cy) * inverse_fy;
             let row_ray = rotation.column(1) * y + rotation.column(2);
             for u in (0..width).step_by(self.stride) {
@@ -164,6 +177,11 @@ impl DepthProblem<'_> {
         }
         gated
     }
+}
+
+/// Robust standard deviation of residuals with these magnitudes, which are reordered.
+pub(super) fn noise_of(magnitudes: &mut [f32]) -> f32 {
+    SIGMA_PER_MEDIAN_ABSOLUTE * median(magnitudes)
 }
 
 /// Gate for a robust scale `sigma` around inverse depth of the scene: several deviations, but no farther than

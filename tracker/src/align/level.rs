@@ -8,10 +8,11 @@ use super::measure::{NOMINAL_PHOTON_VARIANCE, measure_depth, measure_photometric
 use super::objective::{AlignScratch, FrameData, Linearised, Objective, ReferenceData};
 use super::placement::{blur_length, place_sites};
 use super::prior::MotionPrior;
-use super::{AlignSettings, Estimate, UNKNOWNS};
+use super::{AlignSettings, BOWED_UNKNOWNS, Estimate, UNKNOWNS};
 use crate::geometry::PinholeCamera;
 use crate::keyframe::typical_inverse_depth;
 use crate::math::sqrt_f32;
+use crate::trajectory::{ExposureTrajectory, FrameTiming};
 use crate::transfer::BrightnessModel;
 use crate::work::Work;
 
@@ -53,7 +54,8 @@ pub struct LevelOutcome {
     pub patches_in_view: usize,
     /// Depth points that took part.
     pub depth_points: usize,
-    /// Gauss-Newton matrix at the estimate in (centre, motion, gain, offset) coordinates.
+    /// Gauss-Newton matrix at the estimate in (centre, motion, gain, offset) coordinates; where the bow is an unknown
+    /// too, for any bow.
     pub information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
 }
 
@@ -159,15 +161,17 @@ impl Alignment<'_> {
         let estimate = outcome.estimate;
         let camera = self.camera.at_level(plan.level);
         let keypoints = self.reference.keypoints[plan.level];
+        let timing = self.frame.timing;
         let in_view = place_sites(
-            &estimate.keyframe_from_camera,
+            &estimate.path(),
+            &timing,
             keypoints,
             &camera,
             plan.level,
             &self.frame,
             scratch.sites,
         );
-        let blur = blur_length(&estimate.keyframe_from_camera, keypoints, &camera);
+        let blur = blur_length(&exposure_of(&estimate, &timing), keypoints, &camera);
         let mut objective = Objective {
             simd: self.simd,
             camera,
@@ -224,7 +228,7 @@ fn descend(
     outcome.work += objective.work();
     let mut moved = 0.0;
     loop {
-        outcome.information = at.hessian;
+        outcome.information = without_bow(&at.hessian);
         outcome.depth_points = at.depth_points as usize;
         let Some(step) = damping.step(&at.hessian, &at.gradient) else {
             return Descent::Stopped(StopReason::Singular);
@@ -257,7 +261,7 @@ fn descend(
 }
 
 /// Actual over predicted decrease; NaN when the candidate has no finite cost.
-fn gain_ratio(at: &Linearised, next: &Linearised, step: &SVector<f64, UNKNOWNS>) -> f64 {
+fn gain_ratio(at: &Linearised, next: &Linearised, step: &SVector<f64, BOWED_UNKNOWNS>) -> f64 {
     let predicted = -at.gradient.dot(step) - 0.5 * step.dot(&(at.hessian * step));
     (at.cost - next.cost) / predicted.max(f64::MIN_POSITIVE)
 }
@@ -275,12 +279,35 @@ fn view_count(blur: f32, settings: &AlignSettings) -> usize {
 const MIN_SAMPLED_BLUR: f32 = 0.5;
 
 /// Largest image motion in pixels that a step causes at the scene's typical depth.
-fn step_in_pixels(step: &SVector<f64, UNKNOWNS>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
+fn step_in_pixels(step: &SVector<f64, BOWED_UNKNOWNS>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
     let pixels = |tangent: Vector6<f64>| {
         let translation = tangent.fixed_rows::<3>(0).norm() * inverse_depth;
         camera.fx * translation.max(tangent.fixed_rows::<3>(3).norm())
     };
     let centre = pixels(step.fixed_rows::<6>(0).into_owned());
     let motion = pixels(step.fixed_rows::<6>(6).into_owned());
-    centre.max(0.5 * motion)
+    let bow = pixels(step.fixed_rows::<6>(UNKNOWNS).into_owned());
+    // Where the path begins and ends, half a unit of normalised time from its middle.
+    centre.max(0.5 * motion).max(0.25 * bow)
+}
+
+/// The motion during the exposure of the middle row.
+fn exposure_of(estimate: &Estimate, timing: &FrameTiming) -> ExposureTrajectory {
+    if timing.reaches_outside() {
+        estimate.path().between(0.5 - 0.5 * timing.exposure, 0.5 + 0.5 * timing.exposure)
+    } else {
+        estimate.keyframe_from_camera
+    }
+}
+
+/// The Gauss-Newton matrix of the other unknowns when the bow may take any value: the Schur complement of its block.
+fn without_bow(hessian: &SMatrix<f64, BOWED_UNKNOWNS, BOWED_UNKNOWNS>) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
+    const BOW: usize = BOWED_UNKNOWNS - UNKNOWNS;
+    let others = hessian.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();
+    let cross = hessian.fixed_view::<UNKNOWNS, BOW>(0, UNKNOWNS).into_owned();
+    if cross.iter().all(|entry| *entry == 0.0) {
+        return others;
+    }
+    let bow = hessian.fixed_view::<BOW, BOW>(UNKNOWNS, UNKNOWNS).into_owned();
+    bow.cholesky().map_or(others, |bow| others - cross * bow.solve(&cross.transpose()))
 }

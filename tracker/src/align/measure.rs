@@ -1,11 +1,10 @@
 //! Noise scales and outliers at the current estimate, before a linearisation.
 
-use super::depth_term::{DepthProblem, gate_for};
+use super::depth_term::{DepthProblem, gate_for, noise_of};
 use super::objective::{AlignScratch, DepthPart, Objective};
 use super::scale::median;
 use super::{AlignSettings, Estimate};
-use crate::trajectory::SampleRule;
-use crate::transfer::{self, PatchCost, ResidualModel, virtual_views};
+use crate::transfer::{self, PatchCost, ResidualModel, RowBand};
 
 /// Nominal variance per unit of light; the measured scale multiplies it.
 pub(super) const NOMINAL_PHOTON_VARIANCE: f32 = 1e-4;
@@ -30,17 +29,13 @@ pub(super) fn measure_photometric(
     in_view: usize,
     scratch: &mut AlignScratch,
 ) -> usize {
-    let views = virtual_views(
-        &estimate.keyframe_from_camera,
-        objective.views,
-        SampleRule::Midpoint,
-        &objective.camera,
-    );
     // Without a threshold the mean cost of a patch is half its mean square.
     let square_model = ResidualModel { huber: f32::MAX, ..objective.model };
-    let problem = objective.transfer_problem(estimate, &views);
     let (sites, costs) = (&mut scratch.sites[..in_view], &mut scratch.costs[..in_view]);
-    transfer::evaluate_cost(objective.simd, &problem, sites, &square_model, costs);
+    objective.for_each_band(estimate, sites, |problem, of_band| {
+        let (sites, costs) = (&sites[of_band.clone()], &mut costs[of_band]);
+        transfer::evaluate_cost(objective.simd, problem, sites, &square_model, costs);
+    });
     let mut count = 0;
     for cost in costs.iter().filter(|cost| cost.pixels > 0.0) {
         scratch.medians[count] = mean_cost(cost);
@@ -83,8 +78,14 @@ pub(super) fn measure_depth<'a>(
         // A sample of the points is enough for a median.
         stride: stride * 2,
         gate: gate_for(f32::MAX),
+        band: RowBand::whole(objective.frame.depth.height),
     };
-    let (sigma, count) = problem.noise_scale(&estimate.keyframe_from_camera.mid(), medians);
+    let mut count = 0;
+    for (band, s) in objective.depth_bands() {
+        problem.band = band;
+        count += problem.absolute_residuals(&estimate.path().at(s), &mut medians[count..]);
+    }
+    let sigma = noise_of(&mut medians[..count]);
     if count * stride * stride * 4 < MIN_DEPTH_POINTS * 16 {
         return None;
     }

@@ -21,31 +21,49 @@ mod settings;
 
 pub use level::{Alignment, LevelOutcome, LevelPlan, StopReason};
 pub use objective::{AlignScratch, FrameData, ReferenceData};
-pub use placement::{blur_length, place_sites};
+pub use placement::{MAX_BANDS, blur_length, place_sites};
 pub use prior::MotionPrior;
 pub use settings::AlignSettings;
 
-use nalgebra::SVector;
+use nalgebra::{SVector, Vector6};
 
-use crate::trajectory::ExposureTrajectory;
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory};
 use crate::transfer::BrightnessModel;
 
-/// Number of unknowns: centre motion (6), exposure motion (6), gain, offset.
+/// Number of unknowns of a frame whose pixels are all exposed at the same time: centre motion (6), exposure motion (6),
+/// gain, offset.
 pub const UNKNOWNS: usize = 14;
+
+/// Number of unknowns where rows or depth have other times: the same, then the bow of the path (6).
+pub const BOWED_UNKNOWNS: usize = UNKNOWNS + 6;
 
 /// What an alignment estimates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// `keyframe_from_camera` at shutter opening and closing.
+    /// `keyframe_from_camera` at both ends of the time that the path spans: for a global shutter those of the exposure.
     pub keyframe_from_camera: ExposureTrajectory,
+    /// What the path has beyond linear motion; zero for a global shutter.
+    pub bow: Vector6<f64>,
     /// Brightness of the frame relative to the reference.
     pub brightness: BrightnessModel,
 }
 
 impl Estimate {
-    /// Applies a step in (centre, exposure motion, gain, offset) coordinates.
+    /// An estimate without bow and with the brightness of the reference.
     #[must_use]
-    pub fn stepped(&self, step: &SVector<f64, UNKNOWNS>) -> Self {
+    pub fn linear(keyframe_from_camera: ExposureTrajectory) -> Self {
+        Self { keyframe_from_camera, bow: Vector6::zeros(), brightness: BrightnessModel::default() }
+    }
+
+    /// The path as a function of time.
+    #[must_use]
+    pub fn path(&self) -> BowedTrajectory {
+        BowedTrajectory { linear: self.keyframe_from_camera, bow: self.bow }
+    }
+
+    /// Applies a step in (centre, exposure motion, gain, offset, bow) coordinates.
+    #[must_use]
+    pub fn stepped(&self, step: &SVector<f64, BOWED_UNKNOWNS>) -> Self {
         let centre = step.fixed_rows::<6>(0).into_owned();
         let motion = step.fixed_rows::<6>(6).into_owned();
         Self {
@@ -53,6 +71,7 @@ impl Estimate {
                 start: self.keyframe_from_camera.start.perturbed(&(centre - motion * 0.5)),
                 end: self.keyframe_from_camera.end.perturbed(&(centre + motion * 0.5)),
             },
+            bow: self.bow + step.fixed_rows::<6>(UNKNOWNS),
             brightness: BrightnessModel {
                 gain: self.brightness.gain + step[12] as f32,
                 offset: self.brightness.offset + step[13] as f32,

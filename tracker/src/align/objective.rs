@@ -1,19 +1,23 @@
 //! The combined objective and its normal equations in (centre, exposure motion) coordinates.
 
+use arrayvec::ArrayVec;
+use core::ops::Range;
 use fearless_simd::Level;
+
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-use super::depth_term::DepthProblem;
+use super::depth_term::{DepthProblem, DepthSums};
+use super::placement::MAX_BANDS;
 use super::prior::MotionPrior;
-use super::{AlignSettings, Estimate, UNKNOWNS};
+use super::{AlignSettings, BOWED_UNKNOWNS, Estimate, UNKNOWNS};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{GreyLevel, PixelRectangle};
 use crate::keyframe::Keypoint;
 use crate::surface::{InverseDepthMap, SurfacePlanes};
-use crate::trajectory::{ExposureTrajectory, SampleRule};
+use crate::trajectory::{BowedTrajectory, FrameTiming, SampleRule};
 use crate::transfer::{
-    self, BrightnessModel, PatchCost, PatchSite, PhotometricSums, ResidualModel, TransferProblem,
-    virtual_views,
+    self, BOWED_PATH, BrightnessModel, LINEAR_PATH, PatchCost, PatchSite, ROW_LENGTH, ResidualModel, RowBand,
+    RowTimes, TransferProblem, virtual_views,
 };
 use crate::work::Work;
 
@@ -35,12 +39,14 @@ pub struct ReferenceData<'a> {
 pub struct FrameData<'a> {
     /// Blurred image, finest level first.
     pub levels: &'a [GreyLevel<'a>],
-    /// Inverse depth at mid exposure.
+    /// Inverse depth at the time that `timing` gives.
     pub depth: &'a InverseDepthMap<'a>,
     /// Which of `levels` has the size of `depth`.
     pub depth_level: usize,
     /// Part of `levels[0]` that holds data.
     pub region: PixelRectangle,
+    /// When its rows and its depth were measured.
+    pub timing: FrameTiming,
 }
 
 /// Memory that an alignment works in.
@@ -90,9 +96,9 @@ pub(super) struct Linearised {
     /// Value of the objective.
     pub cost: f64,
     /// Gauss-Newton matrix.
-    pub hessian: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+    pub hessian: SMatrix<f64, BOWED_UNKNOWNS, BOWED_UNKNOWNS>,
     /// Gradient.
-    pub gradient: SVector<f64, UNKNOWNS>,
+    pub gradient: SVector<f64, BOWED_UNKNOWNS>,
     /// Photometric pixels that took part.
     pub pixels: f64,
     /// Depth points that took part.
@@ -121,22 +127,16 @@ impl Objective<'_> {
         costs: &mut [PatchCost],
     ) -> Linearised {
         let trajectory = &estimate.keyframe_from_camera;
-        let photometric = self.photometric(estimate, costs);
-        let pixels = photometric.pixels;
+        let mut sums = self.photometric(estimate, costs);
         let mut weight = 1.0 / self.settings.photometric_correlation;
         if let Some((expected, _)) = expected_counts {
-            weight *= count_ratio(expected, pixels);
+            weight *= count_ratio(expected, sums.pixels);
         }
-        let mut sums = Linearised {
-            cost: weight * photometric.cost,
-            hessian: photometric.hessian * weight,
-            gradient: photometric.gradient * weight,
-            pixels,
-            depth_points: 0.0,
-            depth_compared: 0.0,
-        };
+        sums.cost *= weight;
+        sums.hessian *= weight;
+        sums.gradient *= weight;
         if let Some(depth) = &self.depth {
-            self.add_depth(depth, trajectory, expected_counts.map(|counts| counts.1), &mut sums);
+            self.add_depth(depth, &estimate.path(), expected_counts.map(|counts| counts.1), &mut sums);
         }
         // The matrix is symmetric: what is done to its rows is done to its columns after transposing it.
         let ends = [&trajectory.start, &trajectory.end].map(RigidTransform::rotation_matrix);
@@ -149,41 +149,127 @@ impl Objective<'_> {
         sums
     }
 
-    /// Adds the depth term, distributed from the mid pose to both ends, in left rotations.
+    /// Adds the depth term, distributed from the poses at which depth was measured to the unknowns of the path, in left
+    /// rotations of its ends.
     fn add_depth(
         &self,
         depth: &DepthPart,
-        trajectory: &ExposureTrajectory,
+        path: &BowedTrajectory,
         expected_points: Option<f64>,
         sums: &mut Linearised,
     ) {
-        let depth_sums =
-            depth.problem.linearise(self.simd, &trajectory.mid(), depth.sigma, self.settings.huber);
-        let compared = depth_sums.points + depth_sums.gated;
+        let mut parts: ArrayVec<(DepthSums, PoseWeights), MAX_BANDS> = ArrayVec::new();
+        for (band, s) in self.depth_bands() {
+            let problem = DepthProblem { band, ..depth.problem };
+            let of_band = problem.linearise(self.simd, &path.at(s), depth.sigma, self.settings.huber);
+            parts.push((of_band, PoseWeights::new(path, s)));
+        }
+        let total = |count: fn(&DepthSums) -> f64| parts.iter().map(|part| count(&part.0)).sum::<f64>();
+        let compared = total(|sums| sums.points + sums.gated);
         let weight = depth.weight * expected_points.map_or(1.0, |expected| count_ratio(expected, compared));
-        let blend = trajectory.rotation_blend_left(0.5);
-        sums.cost += weight * depth_sums.cost;
-        sums.depth_points = depth_sums.points;
+        sums.depth_points = total(|sums| sums.points);
         sums.depth_compared = compared;
-        let mut block = sums.hessian.fixed_view_mut::<12, 12>(0, 0);
-        // Symmetric: the columns are spread like the rows, after transposing.
-        let spread = rows_by_ends(&blend, &(depth_sums.hessian * weight)).transpose();
-        block += rows_by_ends(&blend, &spread);
-        let mut rows = sums.gradient.fixed_rows_mut::<12>(0);
-        rows += rows_by_ends(&blend, &(depth_sums.gradient * weight));
+        let bowed = self.frame.timing.reaches_outside();
+        for (of_band, weights) in &parts {
+            sums.cost += weight * of_band.cost;
+            // Symmetric: the columns are spread like the rows, after transposing.
+            let spread = weights.rows(&(of_band.hessian * weight)).transpose();
+            let block = weights.rows(&spread);
+            let rows = weights.rows(&(of_band.gradient * weight));
+            let mut linear = sums.hessian.fixed_view_mut::<LINEAR_PATH, LINEAR_PATH>(0, 0);
+            linear += block.fixed_view::<LINEAR_PATH, LINEAR_PATH>(0, 0);
+            let mut linear = sums.gradient.fixed_rows_mut::<LINEAR_PATH>(0);
+            linear += rows.fixed_rows::<LINEAR_PATH>(0);
+            if bowed {
+                add_bow_block(&block, &rows, sums);
+            }
+        }
     }
 
-    fn photometric(&self, estimate: &Estimate, costs: &mut [PatchCost]) -> PhotometricSums {
-        let views =
-            virtual_views(&estimate.keyframe_from_camera, self.views, SampleRule::Midpoint, &self.camera);
-        let problem = self.transfer_problem(estimate, &views);
-        transfer::linearize(self.simd, &problem, self.sites, &self.model, costs)
+    /// Bands of rows of the depth map and the normalised times at which they were measured.
+    pub(super) fn depth_bands(&self) -> impl Iterator<Item = (RowBand, f64)> {
+        let (timing, height) = (self.frame.timing, self.frame.depth.height);
+        let count = if timing.depth_readout == 0.0 { 1 } else { timing.bands.clamp(1, MAX_BANDS) };
+        (0..count).map(move |index| {
+            let band = RowBand::new(index, count, height);
+            (band, timing.depth_row_time(band.centre(), height))
+        })
     }
 
-    pub(super) fn transfer_problem<'b>(
+    /// Normal equations of the photometric term in left rotations, of unit weight.
+    fn photometric(&self, estimate: &Estimate, costs: &mut [PatchCost]) -> Linearised {
+        let mut sums = Linearised {
+            cost: 0.0,
+            hessian: SMatrix::zeros(),
+            gradient: SVector::zeros(),
+            pixels: 0.0,
+            depth_points: 0.0,
+            depth_compared: 0.0,
+        };
+        let bowed = self.frame.timing.reaches_outside();
+        self.for_each_band(estimate, self.sites, |problem, of_band| {
+            let (sites, costs) = (&self.sites[of_band.clone()], &mut costs[of_band]);
+            if bowed {
+                let of_band = transfer::linearize_bowed(self.simd, problem, sites, &self.model, costs);
+                sums.cost += of_band.cost;
+                sums.pixels += of_band.pixels;
+                for i in 0..BOWED_UNKNOWNS {
+                    sums.gradient[unknown_of_column(i)] += of_band.gradient[i];
+                    for j in 0..BOWED_UNKNOWNS {
+                        sums.hessian[(unknown_of_column(i), unknown_of_column(j))] += of_band.hessian[(i, j)];
+                    }
+                }
+            } else {
+                let all = transfer::linearize(self.simd, problem, sites, &self.model, costs);
+                sums.cost = all.cost;
+                sums.pixels = all.pixels;
+                sums.hessian.fixed_view_mut::<ROW_LENGTH, ROW_LENGTH>(0, 0).copy_from(&all.hessian);
+                sums.gradient.fixed_rows_mut::<ROW_LENGTH>(0).copy_from(&all.gradient);
+            }
+        });
+        sums
+    }
+
+    /// Calls `visit` with the transfer of every band of rows and the range of `sites` in it; once, with all sites, where
+    /// the rows are exposed at the same time.
+    pub(super) fn for_each_band(
+        &self,
+        estimate: &Estimate,
+        sites: &[PatchSite],
+        mut visit: impl FnMut(&TransferProblem, Range<usize>),
+    ) {
+        let timing = &self.frame.timing;
+        if !timing.reaches_outside() {
+            let path = &estimate.keyframe_from_camera;
+            let views = virtual_views(path, self.views, SampleRule::Midpoint, &self.camera);
+            return visit(&self.transfer_problem(estimate, &views, RowTimes::default()), 0..sites.len());
+        }
+        let path = estimate.path();
+        let height = self.frame.levels[self.level].height;
+        let bands = if timing.is_rolling() { timing.bands.clamp(1, MAX_BANDS) } else { 1 };
+        let mut first = 0;
+        for index in 0..bands {
+            let band = RowBand::new(index, bands, height);
+            // Sites are sorted by row where there is more than one band.
+            let end = match index + 1 == bands {
+                true => sites.len(),
+                false => sites.partition_point(|site| usize::try_from(site.v).is_ok_and(|v| v < band.end)),
+            };
+            if first < end {
+                let views = band.views(&path, timing, self.views, &self.camera, self.inverse_depth);
+                let rows =
+                    RowTimes { centre: band.centre() as f32, step: (timing.readout / height as f64) as f32 };
+                visit(&self.transfer_problem(estimate, &views, rows), first..end);
+            }
+            first = end;
+        }
+    }
+
+    fn transfer_problem<'b>(
         &'b self,
         estimate: &Estimate,
         views: &'b [transfer::VirtualView],
+        rows: RowTimes,
     ) -> TransferProblem<'b> {
         TransferProblem {
             reference: self.reference.levels[self.level].image(),
@@ -192,6 +278,7 @@ impl Objective<'_> {
             centre: [self.camera.cx as f32, self.camera.cy as f32],
             views,
             brightness: estimate.brightness,
+            rows,
         }
     }
 
@@ -201,6 +288,19 @@ impl Objective<'_> {
         for i in 0..6 {
             result.hessian[(6 + i, 6 + i)] += self.prior.information[i];
             result.gradient[6 + i] += self.prior.information[i] * residual[i];
+        }
+        if self.frame.timing.reaches_outside() {
+            let residual = estimate.bow - self.prior.bow;
+            for (i, information) in self.prior.bow_information.iter().enumerate() {
+                result.cost += 0.5 * information * residual[i] * residual[i];
+                result.hessian[(UNKNOWNS + i, UNKNOWNS + i)] += information;
+                result.gradient[UNKNOWNS + i] += information * residual[i];
+            }
+        } else {
+            // Not an unknown: it stays where it is.
+            for i in UNKNOWNS..BOWED_UNKNOWNS {
+                result.hessian[(i, i)] = 1.0;
+            }
         }
         let brightness = [
             (f64::from(estimate.brightness.gain - self.expected_brightness.gain), self.settings.gain_sigma),
@@ -222,30 +322,78 @@ fn count_ratio(expected: f64, count: f64) -> f64 {
     if count > 0.0 { expected / count } else { 1.0 }
 }
 
-/// Turns rows that belong to the mid pose's left tangent into those of the left tangents of both ends, where
-/// `blend` is the part of the end in the mid rotation: multiplies by the transpose of
-/// `(I/2, 0, I/2, 0; 0, I - B, 0, B)` without the products with zero and one.
-fn rows_by_ends<const COLUMNS: usize>(
-    blend: &Matrix3<f64>,
-    mid: &SMatrix<f64, 6, COLUMNS>,
-) -> SMatrix<f64, 12, COLUMNS> {
-    let translation = mid.fixed_rows::<3>(0) * 0.5;
-    let turn = mid.fixed_rows::<3>(3);
-    let end_turn = blend.transpose() * turn;
-    let mut ends = SMatrix::<f64, 12, COLUMNS>::zeros();
-    ends.fixed_rows_mut::<3>(0).copy_from(&translation);
-    ends.fixed_rows_mut::<3>(3).copy_from(&(turn - end_turn));
-    ends.fixed_rows_mut::<3>(6).copy_from(&translation);
-    ends.fixed_rows_mut::<3>(9).copy_from(&end_turn);
-    ends
+/// Unknown that column `column` of a row with bow belongs to: gain and offset come before the bow among the unknowns.
+const fn unknown_of_column(column: usize) -> usize {
+    match column {
+        0..LINEAR_PATH => column,
+        LINEAR_PATH..BOWED_PATH => column + (UNKNOWNS - LINEAR_PATH),
+        _ => column - (BOWED_PATH - LINEAR_PATH),
+    }
+}
+
+/// Adds the rows and columns of the bow of a matrix in the order of [`BOWED_PATH`].
+fn add_bow_block(
+    block: &SMatrix<f64, BOWED_PATH, BOWED_PATH>,
+    rows: &SVector<f64, BOWED_PATH>,
+    sums: &mut Linearised,
+) {
+    for i in LINEAR_PATH..BOWED_PATH {
+        sums.gradient[unknown_of_column(i)] += rows[i];
+        for j in 0..BOWED_PATH {
+            sums.hessian[(unknown_of_column(i), unknown_of_column(j))] += block[(i, j)];
+            if j < LINEAR_PATH {
+                sums.hessian[(unknown_of_column(j), unknown_of_column(i))] += block[(j, i)];
+            }
+        }
+    }
+}
+
+/// How the pose at one time of a path follows from its parameters, in left rotations: the matrix
+/// `((1 - s) I, 0, s I, 0, q I, 0; 0, I - B, 0, B, 0, q C)` with `q = (s - 1/2)^2`, without its zeros and ones.
+struct PoseWeights {
+    /// Parts of start, end and bow in the translation.
+    translation: [f64; 3],
+    /// B.
+    blend: Matrix3<f64>,
+    /// q C.
+    bow_blend: Matrix3<f64>,
+}
+
+impl PoseWeights {
+    fn new(path: &BowedTrajectory, s: f64) -> Self {
+        let height = (s - 0.5) * (s - 0.5);
+        Self {
+            translation: [1.0 - s, s, height],
+            blend: path.linear.rotation_blend_left(s),
+            bow_blend: path.bow_blend_left(s) * height,
+        }
+    }
+
+    /// Turns rows that belong to the pose's left tangent into those of the parameters: multiplies by the transpose.
+    fn rows<const COLUMNS: usize>(
+        &self,
+        pose: &SMatrix<f64, 6, COLUMNS>,
+    ) -> SMatrix<f64, BOWED_PATH, COLUMNS> {
+        let shift = pose.fixed_rows::<3>(0);
+        let turn = pose.fixed_rows::<3>(3);
+        let end_turn = self.blend.transpose() * turn;
+        let mut rows = SMatrix::<f64, BOWED_PATH, COLUMNS>::zeros();
+        for (row, weight) in [0, 6, 12].into_iter().zip(self.translation) {
+            rows.fixed_rows_mut::<3>(row).copy_from(&(shift * weight));
+        }
+        rows.fixed_rows_mut::<3>(3).copy_from(&(turn - end_turn));
+        rows.fixed_rows_mut::<3>(9).copy_from(&end_turn);
+        rows.fixed_rows_mut::<3>(15).copy_from(&(self.bow_blend.transpose() * turn));
+        rows
+    }
 }
 
 /// Turns rows that belong to (start, end) left tangents, at the rotations `ends`, into those of (centre, motion)
-/// right tangents; gain and offset stay. With `R` the rotation of an end, the left turn is `R` times the right one;
+/// right tangents; gain, offset and bow stay. With `R` the rotation of an end, the left turn is `R` times the right one;
 /// start and end are `centre -+ motion/2`.
 fn rows_by_centre_and_motion<const COLUMNS: usize>(
     ends: &[Matrix3<f64>; 2],
-    rows: &mut SMatrix<f64, UNKNOWNS, COLUMNS>,
+    rows: &mut SMatrix<f64, BOWED_UNKNOWNS, COLUMNS>,
 ) {
     for (row, rotation) in [3, 9].into_iter().zip(ends) {
         let turned = rotation.transpose() * rows.fixed_rows::<3>(row);
@@ -277,28 +425,35 @@ mod tests {
     #[test]
     fn centre_and_motion_are_the_product_with_the_change_of_coordinates() {
         let ends = turns();
-        let mut change = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
+        let mut change = SMatrix::<f64, BOWED_UNKNOWNS, BOWED_UNKNOWNS>::identity();
         for (row, end, half) in [(0, &ends[0], -0.5), (6, &ends[1], 0.5)] {
             let left = crate::trajectory::left_from_right(end);
             change.fixed_view_mut::<6, 6>(row, 0).copy_from(&left);
             change.fixed_view_mut::<6, 6>(row, 6).copy_from(&(left * half));
         }
-        let mut rows = symmetric::<UNKNOWNS>();
+        let mut rows = symmetric::<BOWED_UNKNOWNS>();
         let expected = change.transpose() * rows;
         rows_by_centre_and_motion(&ends, &mut rows);
         assert!((rows - expected).norm() < 1e-12 * expected.norm());
     }
 
     #[test]
-    fn both_ends_are_the_product_with_the_blend() {
-        let blend = turns()[0] * 0.5;
-        let mut mid_from_ends = SMatrix::<f64, 6, 12>::zeros();
-        mid_from_ends.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(0.5);
-        mid_from_ends.fixed_view_mut::<3, 3>(0, 6).fill_diagonal(0.5);
-        mid_from_ends.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Matrix3::identity() - blend));
-        mid_from_ends.fixed_view_mut::<3, 3>(3, 9).copy_from(&blend);
-        let mid = symmetric::<6>();
-        let expected = mid_from_ends.transpose() * mid;
-        assert!((rows_by_ends(&blend, &mid) - expected).norm() < 1e-12 * expected.norm());
+    fn rows_of_the_path_are_the_product_with_the_weights_of_the_pose() {
+        let (s, height) = (0.8, 0.09);
+        let weights = PoseWeights {
+            translation: [1.0 - s, s, height],
+            blend: turns()[0] * s,
+            bow_blend: turns()[1] * height,
+        };
+        let mut pose_from_path = SMatrix::<f64, 6, BOWED_PATH>::zeros();
+        for (column, weight) in [(0, 1.0 - s), (6, s), (12, height)] {
+            pose_from_path.fixed_view_mut::<3, 3>(0, column).fill_diagonal(weight);
+        }
+        pose_from_path.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Matrix3::identity() - weights.blend));
+        pose_from_path.fixed_view_mut::<3, 3>(3, 9).copy_from(&weights.blend);
+        pose_from_path.fixed_view_mut::<3, 3>(3, 15).copy_from(&weights.bow_blend);
+        let pose = symmetric::<6>();
+        let expected = pose_from_path.transpose() * pose;
+        assert!((weights.rows(&pose) - expected).norm() < 1e-12 * expected.norm());
     }
 }

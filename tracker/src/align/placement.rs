@@ -1,35 +1,74 @@
 //! Where the keyframe's keypoints are seen in the current frame.
 
-use nalgebra::Vector3;
+use arrayvec::ArrayVec;
+use nalgebra::{Matrix3, Vector3};
 
 use super::objective::FrameData;
-use crate::geometry::PinholeCamera;
+use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::keyframe::Keypoint;
 use crate::math::{round_half_up_to_i32, sqrt_f32};
 use crate::surface::spread_limit;
-use crate::trajectory::ExposureTrajectory;
-use crate::transfer::{PATTERN_RADIUS, PatchSite};
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
+use crate::transfer::{PATTERN_RADIUS, PatchSite, RowBand};
 
-/// Projects keypoints at mid exposure and keeps those that are inside the image and not hidden behind a nearer
-/// surface of the current depth map. Returns the number of sites.
+/// Most bands of rows that a frame is divided into.
+pub const MAX_BANDS: usize = 16;
+
+/// `camera_from_keyframe` in single precision.
+#[derive(Clone, Copy)]
+struct Projection {
+    rotation: Matrix3<f32>,
+    translation: Vector3<f32>,
+}
+
+impl Projection {
+    fn new(keyframe_from_camera: &RigidTransform) -> Self {
+        let inverse = keyframe_from_camera.inverse();
+        Self {
+            rotation: inverse.rotation_matrix().map(|x| x as f32),
+            translation: inverse.translation.map(|x| x as f32),
+        }
+    }
+
+    /// The point on `ray` times its inverse depth, so that far points stay finite.
+    fn apply(&self, ray: &Vector3<f32>, inverse_depth: f32) -> Vector3<f32> {
+        self.rotation * ray + self.translation * inverse_depth
+    }
+}
+
+/// Projects keypoints at the time when the row is exposed in which they are seen, and keeps those that are inside the
+/// image and not hidden behind a nearer surface of the current depth map. Returns the number of sites; where rows have
+/// times of their own, they are sorted by row.
 pub fn place_sites(
-    keyframe_from_camera: &ExposureTrajectory,
+    path: &BowedTrajectory,
+    timing: &FrameTiming,
     keypoints: &[Keypoint],
     camera: &PinholeCamera,
     level: usize,
     frame: &FrameData,
     sites: &mut [PatchSite],
 ) -> usize {
-    let camera_from_keyframe = keyframe_from_camera.mid().inverse();
-    let rotation = camera_from_keyframe.rotation_matrix().map(|x| x as f32);
-    let translation = camera_from_keyframe.translation.map(|x| x as f32);
+    let middle = Projection::new(&path.at(0.5));
+    // A patch must contain its keypoint, not be centred on it exactly: the pose of a band serves.
+    let mut of_band: ArrayVec<Projection, MAX_BANDS> = ArrayVec::new();
+    if timing.is_rolling() {
+        let bands = timing.bands.clamp(1, MAX_BANDS);
+        of_band.extend((0..bands).map(|band| {
+            let row = RowBand::new(band, bands, camera.height).centre();
+            Projection::new(&path.at(timing.row_time(row, camera.height)))
+        }));
+    }
     let (fx, fy, cx, cy) = (camera.fx as f32, camera.fy as f32, camera.cx as f32, camera.cy as f32);
     let region = frame.region.at_level(level).shrunk(PATTERN_RADIUS);
     let mut count = 0;
     for keypoint in keypoints {
         let ray = Vector3::new((keypoint.u - cx) / fx, (keypoint.v - cy) / fy, 1.0);
-        // Scaled by inverse depth, so far points stay finite.
-        let x = rotation * ray + translation * keypoint.inverse_depth;
+        let mut x = middle.apply(&ray, keypoint.inverse_depth);
+        if !of_band.is_empty() && x.z > 1e-3 {
+            let row = (fy * x.y / x.z + cy).clamp(0.0, camera.height as f32 - 1.0);
+            let band = (row * of_band.len() as f32 / camera.height as f32) as usize;
+            x = of_band[band.min(of_band.len() - 1)].apply(&ray, keypoint.inverse_depth);
+        }
         if x.z <= 1e-3 || count == sites.len() {
             continue;
         }
@@ -49,6 +88,9 @@ pub fn place_sites(
                 PatchSite { u: column as i16, v: row as i16, inverse_depth: keypoint.inverse_depth };
             count += 1;
         }
+    }
+    if timing.is_rolling() {
+        sites[..count].sort_unstable_by_key(|site| (site.v, site.u));
     }
     count
 }

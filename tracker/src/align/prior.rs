@@ -15,6 +15,10 @@ pub struct MotionPrior {
     pub expected: Vector6<f64>,
     /// Weight `1/variance` of each component.
     pub information: Vector6<f64>,
+    /// Expected bow of the path, see [`crate::trajectory::BowedTrajectory`].
+    pub bow: Vector6<f64>,
+    /// Weight `1/variance` of each component of the bow.
+    pub bow_information: Vector6<f64>,
 }
 
 impl MotionPrior {

@@ -2,7 +2,7 @@
 
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::surface::SurfacePlanes;
-use crate::trajectory::ExposureTrajectory;
+use crate::trajectory::{BowedTrajectory, FrameTiming};
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Columns of a block that shares one displacement: one vector of the blur kernel.
@@ -47,24 +47,31 @@ impl<'m> BlurFlow<'m> {
         self.width.div_ceil(BLOCK_WIDTH)
     }
 
-    /// Computes the displacements for the exposure `keyframe_from_camera` of a keyframe, seen from its own mid
-    /// pose, with the keyframe's surface planes on pyramid level `planes_level`; blocks without a plane take
-    /// `fallback_inverse_depth`. Returns the longest displacement in pixels.
+    /// Computes the displacements for the exposures of the rows of a keyframe along its path `keyframe_from_camera`,
+    /// seen from its own mid pose, with the keyframe's surface planes on pyramid level `planes_level`; blocks without a
+    /// plane take `fallback_inverse_depth`. Returns the longest displacement in pixels.
     pub fn fill(
         &mut self,
-        keyframe_from_camera: &ExposureTrajectory,
+        keyframe_from_camera: &BowedTrajectory,
+        timing: &FrameTiming,
         camera: &PinholeCamera,
         planes: &SurfacePlanes,
         planes_level: usize,
         fallback_inverse_depth: f32,
     ) -> f32 {
-        let ends = [EndView::new(&keyframe_from_camera.start), EndView::new(&keyframe_from_camera.end)];
+        let linear = &keyframe_from_camera.linear;
+        let mut ends = [EndView::new(&linear.start), EndView::new(&linear.end)];
         let (fx, fy, cx, cy) = (camera.fx as f32, camera.fy as f32, camera.cx as f32, camera.cy as f32);
         let per_row = self.blocks_per_row();
         let mut longest_squared = 0.0f32;
         for (block, displacement) in self.displacement.iter_mut().enumerate() {
             let u = ((block % per_row) * BLOCK_WIDTH) as f32 + 0.5 * (BLOCK_WIDTH - 1) as f32;
             let v = ((block / per_row) * BLOCK_HEIGHT) as f32 + 0.5 * (BLOCK_HEIGHT - 1) as f32;
+            if timing.reaches_outside() && block % per_row == 0 {
+                let middle = timing.row_time(f64::from(v), self.height);
+                ends = [-0.5, 0.5]
+                    .map(|end| EndView::new(&keyframe_from_camera.at(middle + end * timing.exposure)));
+            }
             let at = |x: f32| PinholeCamera::pixel_at_level(x, 0, planes_level);
             let rho = planes.inverse_depth(at(u), at(v)).unwrap_or(fallback_inverse_depth);
             let x = [(u - cx) / fx, (v - cy) / fy];
@@ -114,6 +121,7 @@ mod tests {
     use nalgebra::Vector6;
 
     use super::*;
+    use crate::trajectory::ExposureTrajectory;
 
     const CAMERA: PinholeCamera =
         PinholeCamera { width: 100, height: 72, fx: 90.0, fy: 95.0, cx: 48.0, cy: 36.0 };
@@ -133,8 +141,9 @@ mod tests {
             SurfacePlanes { value: &mut value, slope_u: &mut slope_u, slope_v: &mut slope_v, width, height };
         let mut memory = vec![0; BlurFlow::bytes(100, 72) + 64];
         let mut flow = BlurFlow::carve(&mut Arena::new(&mut memory), 100, 72).expect("memory");
-        let exposure = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &motion);
-        let longest = flow.fill(&exposure, &CAMERA, &planes, 1, 2.0 * INVERSE_DEPTH);
+        let linear = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &motion);
+        let path = BowedTrajectory::without_bow(linear);
+        let longest = flow.fill(&path, &FrameTiming::GLOBAL, &CAMERA, &planes, 1, 2.0 * INVERSE_DEPTH);
         let per_row = flow.blocks_per_row();
         let centre = |b: usize| [(b % per_row * 8) as f64 + 3.5, (b / per_row * 4) as f64 + 1.5];
         let blocks = flow.displacement.iter().enumerate();

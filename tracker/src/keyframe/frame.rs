@@ -6,7 +6,7 @@ use super::select::{Keypoint, SelectionSettings, select_keypoints};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
 use crate::surface::{InverseDepthMap, SurfacePlanes, fuse_depth};
-use crate::trajectory::ExposureTrajectory;
+use crate::trajectory::{BowedTrajectory, FrameTiming};
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Upper bound of keypoints per pyramid level.
@@ -39,8 +39,10 @@ pub struct Keyframe<'m> {
     counts: [usize; MAX_LEVELS],
     /// `world_from_keyframe` at mid exposure.
     pub world_from_keyframe: RigidTransform,
-    /// Exposure of the keyframe seen from its own mid pose; `None` while it is unknown.
-    pub keyframe_from_camera: Option<ExposureTrajectory>,
+    /// Path of the keyframe's own frame seen from its mid pose; `None` while it is unknown.
+    pub keyframe_from_camera: Option<BowedTrajectory>,
+    /// When the parts of its frame were measured along that path.
+    pub timing: FrameTiming,
     /// Blur of the image as captured, pixels of its finest level; `f32::MAX` while it is unknown.
     pub blur: f32,
     /// Running number of the frame it was made from.
@@ -85,6 +87,7 @@ impl<'m> Keyframe<'m> {
             counts: [0; MAX_LEVELS],
             world_from_keyframe: RigidTransform::identity(),
             keyframe_from_camera: None,
+            timing: FrameTiming::GLOBAL,
             blur: f32::MAX,
             frame_index: 0,
         })
@@ -167,6 +170,7 @@ impl<'m> Keyframe<'m> {
         }
         self.world_from_keyframe = other.world_from_keyframe;
         self.keyframe_from_camera = other.keyframe_from_camera;
+        self.timing = other.timing;
         self.blur = other.blur / (1u32 << skip) as f32;
         self.frame_index = other.frame_index;
     }

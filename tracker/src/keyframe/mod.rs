@@ -1,7 +1,9 @@
 //! Keyframes: the sharp reference that frames are aligned with.
 
 mod frame;
+mod rectify;
 mod select;
 
 pub use frame::{Keyframe, MAX_KEYPOINTS, max_keypoints};
+pub use rectify::RectifyScratch;
 pub use select::{Keypoint, SelectionSettings, select_keypoints, typical_inverse_depth};

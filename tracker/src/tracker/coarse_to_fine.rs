@@ -40,7 +40,8 @@ pub(super) struct FrameTask<'a> {
     /// Last motion, in the frame of the reference.
     pub(super) motion: Motion,
     pub(super) timestamp: f64,
-    pub(super) exposure: f64,
+    /// Seconds that the path of the frame spans.
+    pub(super) span: f64,
     /// Angular velocity since the last frame, camera frame, rad/s.
     pub(super) gyro: Option<Vector3<f64>>,
     pub(super) brightness: BrightnessModel,
@@ -119,11 +120,11 @@ impl FrameTask<'_> {
             outcome = round.winner.unwrap_or(outcome);
         }
         for level in (0..last_competing).rev() {
-            let start = oriented(outcome.estimate, &self.prior(&outcome.estimate));
+            let start = self.oriented(outcome.estimate);
             outcome = self.level(level, start, scratch);
             work += outcome.work;
         }
-        outcome.estimate = oriented(outcome.estimate, &self.prior(&outcome.estimate));
+        outcome.estimate = self.oriented(outcome.estimate);
         Aligned { outcome, work }
     }
 
@@ -158,6 +159,21 @@ impl FrameTask<'_> {
         self.alignment.align_level(&plan, start, &self.prior(&start), scratch)
     }
 
+    /// The estimate or its reverse, whichever moves in the expected direction: a blurred image alone cannot tell. Rows
+    /// that are exposed one after the other can.
+    fn oriented(&self, estimate: Estimate) -> Estimate {
+        if self.alignment.frame.timing.is_rolling() {
+            return estimate;
+        }
+        let prior = self.prior(&estimate);
+        let towards = prior.information.component_mul(&prior.expected);
+        if estimate.keyframe_from_camera.motion().dot(&towards) < 0.0 {
+            Estimate { keyframe_from_camera: estimate.keyframe_from_camera.reversed(), ..estimate }
+        } else {
+            estimate
+        }
+    }
+
     fn prior(&self, estimate: &Estimate) -> MotionPrior {
         self.prior_at(&estimate.keyframe_from_camera.mid())
     }
@@ -166,7 +182,7 @@ impl FrameTask<'_> {
         self.motion.expected_motion(
             reference_from_mid,
             self.timestamp,
-            self.exposure,
+            self.span,
             &self.alignment.camera,
             self.inverse_depth,
         )
@@ -174,9 +190,14 @@ impl FrameTask<'_> {
 
     /// The estimate with the expected motion around a mid pose.
     fn estimate_at(&self, reference_from_mid: &RigidTransform) -> Estimate {
-        let expected = self.prior_at(reference_from_mid).expected;
+        let prior = self.prior_at(reference_from_mid);
+        let bowed = self.alignment.frame.timing.reaches_outside();
         Estimate {
-            keyframe_from_camera: ExposureTrajectory::from_mid_and_motion(reference_from_mid, &expected),
+            keyframe_from_camera: ExposureTrajectory::from_mid_and_motion(
+                reference_from_mid,
+                &prior.expected,
+            ),
+            bow: if bowed { prior.bow } else { Vector6::zeros() },
             brightness: self.brightness,
         }
     }
@@ -188,14 +209,4 @@ fn score(outcome: &LevelOutcome, keypoints: usize) -> f64 {
     let agreeing = outcome.patches as f64 / keypoints.max(1) as f64;
     let depth = 1.0 + 100.0 * f64::from(outcome.depth_scale);
     if agreeing < MIN_AGREEING { f64::MAX } else { f64::from(outcome.photometric_scale) * depth / agreeing }
-}
-
-/// The estimate or its reverse, whichever moves in the expected direction: a blurred image alone cannot tell.
-fn oriented(estimate: Estimate, prior: &MotionPrior) -> Estimate {
-    let towards = prior.information.component_mul(&prior.expected);
-    if estimate.keyframe_from_camera.motion().dot(&towards) < 0.0 {
-        Estimate { keyframe_from_camera: estimate.keyframe_from_camera.reversed(), ..estimate }
-    } else {
-        estimate
-    }
 }

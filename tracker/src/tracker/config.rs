@@ -1,12 +1,14 @@
 //! Configuration and memory plan.
 
-use crate::align::AlignSettings;
+use super::frame::Frame;
+use crate::align::{AlignSettings, MAX_BANDS};
 use crate::deblur::DeblurScratch;
 use crate::error::ConfigError;
 use crate::geometry::PinholeCamera;
 use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
-use crate::keyframe::{Keyframe, MAX_KEYPOINTS};
+use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch};
 use crate::photometric::InverseResponse;
+use crate::trajectory::FrameTiming;
 use crate::transfer::{PatchCost, PatchSite};
 use crate::workspace::{ARENA_ALIGNMENT, slice_bytes};
 
@@ -41,8 +43,62 @@ pub struct TrackerConfig {
     /// Keyframes before the current one that a lost tracker looks for, 0 to [`MAX_RECENT_KEYFRAMES`]. Each takes
     /// memory and, on lost frames only, time.
     pub recent_keyframes: usize,
+    /// How the images are read out.
+    pub readout: Readout,
     /// Settings of the alignment.
     pub align: AlignSettings,
+}
+
+/// How the images are read out: whether all pixels are measured at the same time.
+///
+/// Row `v` of `h` of a colour image is exposed around `timestamp + ((v + 1/2)/h - 1/2) colour`, a row of a depth image
+/// measured at `depth_timestamp + ((v + 1/2)/h - 1/2) depth`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Readout {
+    /// Time from the first row of the colour image to the last, seconds; negative when the last row comes first, 0 for a
+    /// global shutter.
+    pub colour: f64,
+    /// Time from the first row of the depth image to the last, seconds.
+    pub depth: f64,
+    /// Whether depth images are taken at another time than colour images, see [`super::Frame::depth_timestamp`].
+    pub depth_apart: bool,
+    /// Bands of rows that share their virtual views, 1 to [`MAX_BANDS`]. Eight leave less than a hundredth of a pixel.
+    pub bands: usize,
+}
+
+impl Readout {
+    /// Everything at the same time.
+    pub const GLOBAL: Self = Self { colour: 0.0, depth: 0.0, depth_apart: false, bands: 8 };
+
+    /// Whether the colour image has rows of its own times.
+    #[must_use]
+    pub const fn colour_rolls(&self) -> bool {
+        self.colour != 0.0
+    }
+
+    /// Whether depth has another time than the middle of the colour image, anywhere.
+    #[must_use]
+    pub const fn depth_is_apart(&self) -> bool {
+        self.depth_apart || self.depth != 0.0
+    }
+
+    /// The timing of a frame and the seconds that its path spans: long enough for every row and the depth image.
+    pub(super) fn timing(&self, frame: &Frame) -> (FrameTiming, f64) {
+        let apart = if self.depth_apart { frame.depth_timestamp - frame.timestamp } else { 0.0 };
+        let of_depth = 2.0 * apart.abs() + self.depth.abs();
+        let span = (frame.exposure + self.colour.abs()).max(of_depth);
+        if span == frame.exposure && apart == 0.0 && self.depth == 0.0 {
+            return (FrameTiming::GLOBAL, span);
+        }
+        let timing = FrameTiming {
+            exposure: frame.exposure / span,
+            readout: self.colour / span,
+            bands: self.bands,
+            depth_time: apart / span,
+            depth_readout: self.depth / span,
+        };
+        (timing, span)
+    }
 }
 
 impl TrackerConfig {
@@ -67,6 +123,7 @@ impl TrackerConfig {
             reference: ReferenceMode::Deblurred,
             deblur_iterations: 4,
             recent_keyframes: MAX_RECENT_KEYFRAMES,
+            readout: Readout::GLOBAL,
             align: AlignSettings::default(),
         }
     }
@@ -107,6 +164,7 @@ impl TrackerConfig {
     /// [`ConfigError::Setting`] naming the first setting outside its range.
     pub fn validate(&self) -> Result<(), ConfigError> {
         let c = &self.camera;
+        let readout = &self.readout;
         let size = 32..=8192usize;
         let coarsest = self.levels.saturating_sub(1).min(16);
         let smallest = (c.width >> coarsest).min(c.height >> coarsest);
@@ -129,6 +187,9 @@ impl TrackerConfig {
                 self.surface_level < self.levels,
                 "less than the number of levels",
             ),
+            ("readout.colour", readout.colour, readout.colour.abs() <= 0.1, "-0.1 to 0.1 seconds"),
+            ("readout.depth", readout.depth, readout.depth.abs() <= 0.1, "-0.1 to 0.1 seconds"),
+            ("readout.bands", readout.bands as f64, (1..=MAX_BANDS).contains(&readout.bands), "1 to 16"),
             (
                 "recent_keyframes",
                 self.recent_keyframes as f64,
@@ -152,6 +213,8 @@ impl TrackerConfig {
             surface_level: self.surface_level,
             recent_keyframes: self.recent_keyframes,
             deblur: matches!(self.reference, ReferenceMode::Deblurred),
+            rolling: self.readout.colour_rolls(),
+            depth_apart: self.readout.depth_is_apart(),
         }
         .bytes()
     }
@@ -190,6 +253,10 @@ pub struct WorkspacePlan {
     pub recent_keyframes: usize,
     /// Whether keyframes are deblurred.
     pub deblur: bool,
+    /// Whether the rows of colour images are exposed one after the other.
+    pub rolling: bool,
+    /// Whether depth images are taken at another time than colour images, or have rows of different times.
+    pub depth_apart: bool,
 }
 
 impl WorkspacePlan {
@@ -210,6 +277,7 @@ impl WorkspacePlan {
             + self.recent_keyframes * recent
             + scratch
             + if self.deblur { DeblurScratch::bytes(width, height) } else { 0 }
+            + RectifyScratch::bytes(width, height, surface_level, self.rolling, self.depth_apart)
     }
 }
 
@@ -218,5 +286,15 @@ impl WorkspacePlan {
 #[must_use]
 pub const fn workspace_len(width: usize, height: usize, levels: usize, surface_level: usize) -> usize {
     let recent_keyframes = MAX_RECENT_KEYFRAMES;
-    WorkspacePlan { width, height, levels, surface_level, recent_keyframes, deblur: true }.bytes()
+    WorkspacePlan {
+        width,
+        height,
+        levels,
+        surface_level,
+        recent_keyframes,
+        deblur: true,
+        rolling: false,
+        depth_apart: false,
+    }
+    .bytes()
 }

@@ -8,10 +8,13 @@ use crate::image::{ColourView, DepthView};
 /// One RGB-D frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
-    /// Mid-exposure time in seconds.
+    /// Mid-exposure time in seconds; where rows are exposed one after the other, that of the middle row.
     pub timestamp: f64,
-    /// Exposure time in seconds.
+    /// Exposure time in seconds, of every row.
     pub exposure: f64,
+    /// When the middle row of the depth image was measured, seconds; the same as `timestamp` where depth and colour are
+    /// taken together. It counts only where [`crate::Readout::depth_apart`] says so.
+    pub depth_timestamp: f64,
     /// Undistorted colour or grey image.
     pub colour: ColourView<'a>,
     /// Undistorted depth image registered to the colour image.

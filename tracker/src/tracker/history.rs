@@ -10,11 +10,12 @@ use crate::geometry::{PinholeCamera, RigidTransform};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
     pub(super) timestamp: f64,
-    pub(super) exposure: f64,
     /// Pose at mid exposure.
     pub(super) reference_from_mid: RigidTransform,
     /// Motion from the frame before.
     pub(super) between_frames: Vector6<f64>,
+    /// Time since the frame before, seconds; infinite while there is none.
+    pub(super) interval: f64,
     /// Motion during the exposure; `None` while it is unknown.
     pub(super) within_exposure: Option<Vector6<f64>>,
 }
@@ -25,14 +26,21 @@ const MAX_GAP: f64 = 0.25;
 /// Standard deviation of the expected blur in pixels when the camera stands still.
 const FLOOR_PIXELS: f64 = 0.5;
 
+/// The same for the bow, as a multiple: where a path of one unit ends, a quarter of the bow is seen.
+const BOW_FLOOR: f64 = 4.0;
+
+/// How far the motion within an exposure may correct the velocity that the mid poses around it give, as a share of the
+/// change of the mean velocity between them.
+const EXPOSURE_TRUST: f64 = 0.5;
+
 impl Motion {
     /// A camera at rest.
-    pub(super) fn still(timestamp: f64, exposure: f64, reference_from_mid: RigidTransform) -> Self {
+    pub(super) fn still(timestamp: f64, reference_from_mid: RigidTransform) -> Self {
         Self {
             timestamp,
-            exposure,
             reference_from_mid,
             between_frames: Vector6::zeros(),
+            interval: f64::INFINITY,
             within_exposure: None,
         }
     }
@@ -52,35 +60,73 @@ impl Motion {
         if dt > MAX_GAP { self.reference_from_mid } else { self.reference_from_mid.perturbed(&(rate * dt)) }
     }
 
-    /// Belief about the motion during an exposure of `exposure` seconds whose mid pose is `reference_from_mid`, at
-    /// time `timestamp`.
+    /// Belief about the path of a frame at time `timestamp` whose mid pose is `reference_from_mid` and whose path spans
+    /// `span` seconds.
     ///
-    /// The trapezoidal rule: the motion between the mid exposures is the mean of the velocities at both, so
-    /// `v = 2 m/dt - v_previous`. It carries the direction of time and needs no smoothness beyond one frame.
+    /// Mid poses are well measured and never alternate, so the velocity follows from them. The trapezoidal rule, the mean
+    /// of the velocities at both ends is that between them, gives `v = 2 m/dt - v_previous`, where `v_previous` is the
+    /// mean slope of the mid poses on both sides of the previous frame. That frame's own exposure says it better where the
+    /// hand jerks, but what was wrong there would come back here with the other sign, and a blurred picture does not mind
+    /// the sign. So it may correct the slope by a share of how much the mid poses themselves change direction: errors
+    /// cannot live on, whatever the picture says.
     pub(super) fn expected_motion(
         &self,
         reference_from_mid: &RigidTransform,
         timestamp: f64,
-        exposure: f64,
+        span: f64,
         camera: &PinholeCamera,
         inverse_depth: f64,
     ) -> MotionPrior {
         let dt = timestamp - self.timestamp;
         let mean_rate = self.reference_from_mid.tangent_to(reference_from_mid) / dt;
+        let mut bow = Vector6::zeros();
         let (rate, spread) = match self.within_exposure.filter(|_| dt <= MAX_GAP) {
-            Some(previous) => {
+            Some(measured) => {
+                let previous = self.previous_rate(&mean_rate, dt, &measured);
                 let rate = mean_rate * 2.0 - previous;
-                (rate, (rate - previous).abs() * 0.2 + rate.abs() * 0.1)
+                let change = rate - previous;
+                bow = change * (0.5 * span * span / dt);
+                (rate, change.abs() * 0.2 + rate.abs() * 0.1)
             }
             None => (mean_rate, mean_rate.abs() * 0.6),
         };
         let pixel = FLOOR_PIXELS / camera.fx;
-        let information = Vector6::from_fn(|i, _| {
-            let (group, floor) = if i < 3 { (0, pixel / inverse_depth.max(0.02)) } else { (3, pixel) };
-            let sigma = spread.fixed_rows::<3>(group).norm() * exposure + floor;
-            1.0 / (sigma * sigma)
-        });
-        MotionPrior { expected: rate * exposure, information }
+        let floors = [pixel / inverse_depth.max(0.02), pixel];
+        let information = |spread: &Vector6<f64>, floor_factor: f64| {
+            Vector6::from_fn(|i, _| {
+                let (first, floor) = if i < 3 { (0, floors[0]) } else { (3, floors[1]) };
+                let sigma = spread.fixed_rows::<3>(first).norm() + floor * floor_factor;
+                1.0 / (sigma * sigma)
+            })
+        };
+        // A hand's acceleration changes by its own size within a frame.
+        let bow_spread = bow.abs() + rate.abs() * (0.1 * span);
+        MotionPrior {
+            expected: rate * span,
+            information: information(&(spread * span), 1.0),
+            bow,
+            bow_information: information(&bow_spread, BOW_FLOOR),
+        }
+    }
+
+    /// Velocity at the last frame, given the mean rate from it to the next, `dt` seconds later, and what its own exposure
+    /// says.
+    fn previous_rate(&self, mean_rate: &Vector6<f64>, dt: f64, measured: &Vector6<f64>) -> Vector6<f64> {
+        if self.interval > MAX_GAP {
+            return *measured;
+        }
+        // The slope at the middle of three points: the nearer side counts more.
+        let slope = (mean_rate * self.interval + self.between_frames * dt) / (dt + self.interval);
+        let mut correction = measured - slope;
+        let bend = mean_rate - self.between_frames;
+        for group in [0, 3] {
+            let limit = EXPOSURE_TRUST * bend.fixed_rows::<3>(group).norm();
+            let length = correction.fixed_rows::<3>(group).norm();
+            if length > limit {
+                correction.fixed_rows_mut::<3>(group).scale_mut(limit / length);
+            }
+        }
+        slope + correction
     }
 }
 
@@ -112,7 +158,7 @@ mod tests {
     }
 
     fn motion(t: f64) -> Motion {
-        Motion { within_exposure: Some(quadratic(t).1), ..Motion::still(t, 0.01, pose(t)) }
+        Motion { within_exposure: Some(quadratic(t).1), ..Motion::still(t, pose(t)) }
     }
 
     #[test]
@@ -141,7 +187,7 @@ mod tests {
 
     #[test]
     fn a_camera_at_rest_is_expected_to_stay_within_half_a_pixel() {
-        let still = Motion::still(0.0, 0.01, RigidTransform::identity());
+        let still = Motion::still(0.0, RigidTransform::identity());
         let prior = still.expected_motion(&RigidTransform::identity(), DT, 0.01, &CAMERA, 0.5);
         assert_eq!(prior.expected, Vector6::zeros());
         // Half a pixel is 0.5/500 rad, and twice that in metres at 2 m.

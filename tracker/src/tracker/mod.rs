@@ -11,7 +11,9 @@ mod recovery;
 mod result;
 mod track;
 
-pub use config::{Effort, MAX_RECENT_KEYFRAMES, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len};
+pub use config::{
+    Effort, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len,
+};
 pub use frame::{Frame, ReferenceView};
 pub use result::{FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

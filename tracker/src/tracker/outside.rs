@@ -5,7 +5,7 @@ use super::history::Motion;
 use super::track::Tracker;
 use crate::error::FrameError;
 use crate::geometry::RigidTransform;
-use crate::trajectory::ExposureTrajectory;
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use crate::transfer::BrightnessModel;
 
 impl Tracker<'_> {
@@ -25,14 +25,16 @@ impl Tracker<'_> {
         self.keyframe.pyramid.fill(&view.colour, &self.luminance);
         self.keyframe.depth.fill(&view.depth, self.config.metres_per_unit);
         self.keyframe.world_from_keyframe = view.world_from_camera;
-        self.keyframe.keyframe_from_camera = Some(ExposureTrajectory::still(RigidTransform::identity()));
+        let still = ExposureTrajectory::still(RigidTransform::identity());
+        self.keyframe.keyframe_from_camera = Some(BowedTrajectory::without_bow(still));
+        self.keyframe.timing = FrameTiming::GLOBAL;
         self.keyframe.blur = 0.0;
         self.keyframe.frame_index = self.frames.saturating_sub(1);
         self.keyframe.restart_surface();
         self.select_keypoints();
         self.brightness = BrightnessModel::default();
         if self.motion.is_none() {
-            self.motion = Some(Motion::still(self.last_timestamp, 0.0, view.world_from_camera));
+            self.motion = Some(Motion::still(self.last_timestamp, view.world_from_camera));
         }
         Ok(())
     }
@@ -53,7 +55,7 @@ impl Tracker<'_> {
         }
         self.set_reference(view)?;
         // As long ago as can be: the way from there to the next frame then says nothing about its speed.
-        self.motion = Some(Motion::still(f64::NEG_INFINITY, 0.0, *world_from_camera));
+        self.motion = Some(Motion::still(f64::NEG_INFINITY, *world_from_camera));
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use nalgebra::SMatrix;
 
 use crate::align::{LevelOutcome, StopReason, UNKNOWNS};
+use crate::geometry::RigidTransform;
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
 use crate::work::Work;
@@ -37,6 +38,8 @@ pub struct Revision {
     pub index: usize,
     /// `world_from_camera` at its shutter opening and closing.
     pub world_from_camera: ExposureTrajectory,
+    /// `world_from_camera` at mid exposure.
+    pub world_from_mid: RigidTransform,
     /// Its blur in pixels.
     pub blur: f32,
 }
@@ -50,8 +53,12 @@ pub struct FrameResult {
     pub timestamp: f64,
     /// How far the poses can be trusted.
     pub status: FrameStatus,
-    /// `world_from_camera` at shutter opening and closing; the world is the first frame's camera at mid exposure.
+    /// `world_from_camera` at shutter opening and closing of the middle row; the world is the first frame's camera at mid
+    /// exposure.
     pub world_from_camera: ExposureTrajectory,
+    /// `world_from_camera` at mid exposure of the middle row. That is the middle of the linear motion between opening and
+    /// closing unless the path's acceleration is estimated, too.
+    pub world_from_mid: RigidTransform,
     /// Inverse covariance of (centre motion, exposure motion, gain, offset) as the objective sees it: translation
     /// in keyframe axes in metres, rotation in the camera in radians.
     pub information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
@@ -94,6 +101,7 @@ impl FrameResult {
             index,
             timestamp,
             status: FrameStatus::Lost,
+            world_from_mid: world_from_camera.mid(),
             world_from_camera,
             information: outcome.information,
             brightness: outcome.estimate.brightness,

@@ -3,6 +3,7 @@
 use core::mem;
 
 use fearless_simd::Level;
+use nalgebra::Vector6;
 
 use super::coarse_to_fine::{Aligned, FrameTask};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
@@ -11,15 +12,15 @@ use super::history::Motion;
 use super::policy::{Evidence, Typical, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
 use super::result::{FrameResult, FrameStatus, Revision};
-use crate::align::{AlignScratch, Alignment, FrameData, LevelOutcome, ReferenceData, blur_length};
+use crate::align::{AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, ReferenceData, blur_length};
 use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
 use crate::geometry::RigidTransform;
 use crate::image::GreyPyramid;
-use crate::keyframe::{Keyframe, MAX_KEYPOINTS, typical_inverse_depth};
+use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch, typical_inverse_depth};
 use crate::photometric::LuminanceTable;
 use crate::surface::InverseDepthMap;
-use crate::trajectory::ExposureTrajectory;
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use crate::transfer::BrightnessModel;
 use crate::work::Work;
 use crate::workspace::Arena;
@@ -31,8 +32,23 @@ const MIN_STRENGTH: f32 = 0.02;
 const MIN_START_KEYPOINTS: usize = 24;
 const MIN_START_DEPTH: f32 = 0.1;
 
+/// Largest time between a colour image and its depth image, seconds.
+const MAX_DEPTH_OFFSET: f64 = 0.2;
+
 /// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
 const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
+
+/// Alignments of the second frame with a first one whose own shear becomes known by them.
+const BOOTSTRAP_ROUNDS: usize = 3;
+
+/// The linear motion during the exposure of the middle row.
+fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajectory {
+    if timing.reaches_outside() {
+        path.between(0.5 - 0.5 * timing.exposure, 0.5 + 0.5 * timing.exposure)
+    } else {
+        path.linear
+    }
+}
 
 /// Estimates camera poses at shutter opening and closing, frame by frame.
 #[derive(Debug)]
@@ -47,6 +63,12 @@ pub struct Tracker<'m> {
     pub(super) recent: RecentKeyframes<'m>,
     scratch: AlignScratch<'m>,
     deblur: DeblurScratch<'m>,
+    rectify: RectifyScratch<'m>,
+    /// When the parts of the current frame were measured, along a path of `span` seconds.
+    timing: FrameTiming,
+    span: f64,
+    /// Seconds that the path of the keyframe's frame spans.
+    keyframe_span: f64,
     /// Motion in the world; `None` before the first usable frame.
     pub(super) motion: Option<Motion>,
     pub(super) brightness: BrightnessModel,
@@ -90,6 +112,16 @@ impl<'m> Tracker<'m> {
                 ReferenceMode::Deblurred => DeblurScratch::carve(&mut arena, camera.width, camera.height)?,
                 ReferenceMode::Raw => DeblurScratch::carve(&mut arena, 0, 0)?,
             },
+            rectify: RectifyScratch::carve(
+                &mut arena,
+                camera,
+                surface_level,
+                config.readout.colour_rolls(),
+                config.readout.depth_is_apart(),
+            )?,
+            timing: FrameTiming::GLOBAL,
+            span: 0.0,
+            keyframe_span: 0.0,
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),
@@ -109,6 +141,7 @@ impl<'m> Tracker<'m> {
         self.work = Work { image_pixels: self.pixels(), ..Work::none() };
         self.pyramid.fill(&frame.colour, &self.luminance);
         self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
+        (self.timing, self.span) = self.config.readout.timing(frame);
         let mut result = match self.motion {
             None => self.start(frame),
             Some(motion) => self.follow(frame, &motion),
@@ -139,6 +172,10 @@ impl<'m> Tracker<'m> {
         if !(frame.exposure >= 0.0 && frame.exposure.is_finite()) {
             return Err(FrameError::Exposure { got: frame.exposure });
         }
+        let apart = frame.depth_timestamp - frame.timestamp;
+        if self.config.readout.depth_apart && !(apart.abs() <= MAX_DEPTH_OFFSET) {
+            return Err(FrameError::DepthTimestamp { frame: frame.timestamp, got: frame.depth_timestamp });
+        }
         if !(frame.timestamp.is_finite() && frame.timestamp > self.last_timestamp) {
             return Err(FrameError::Timestamp { previous: self.last_timestamp, got: frame.timestamp });
         }
@@ -157,15 +194,12 @@ impl<'m> Tracker<'m> {
     fn start(&mut self, frame: &Frame) -> FrameResult {
         let origin = RigidTransform::identity();
         let still = ExposureTrajectory::still(origin);
-        let nothing = LevelOutcome::unchanged(crate::align::Estimate {
-            keyframe_from_camera: still,
-            brightness: BrightnessModel::default(),
-        });
+        let nothing = LevelOutcome::unchanged(Estimate::linear(still));
         let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.promote(&origin, None, f32::MAX);
         let enough = self.keyframe.finest_keypoints().len() >= MIN_START_KEYPOINTS;
         if enough && self.depth_share >= MIN_START_DEPTH {
-            self.motion = Some(Motion::still(frame.timestamp, frame.exposure, origin));
+            self.motion = Some(Motion::still(frame.timestamp, origin));
             result.status = FrameStatus::Ok;
             result.inliers = 1.0;
             result.is_keyframe = true;
@@ -176,7 +210,7 @@ impl<'m> Tracker<'m> {
     fn follow(&mut self, frame: &Frame, motion: &Motion) -> FrameResult {
         let mut aligned;
         let mut revision = None;
-        if self.config.align.blur && self.keyframe.keyframe_from_camera.is_none() && frame.exposure > 0.0 {
+        if self.path_is_modelled() && self.keyframe.keyframe_from_camera.is_none() {
             (aligned, revision) = self.bootstrap(frame, motion);
         } else {
             aligned = self.align(frame, motion, self.config.align.blur, None);
@@ -204,14 +238,11 @@ impl<'m> Tracker<'m> {
     /// becomes the keyframe, and like that of the very first one its motion is learnt from the next frame.
     fn resume(&mut self, frame: &Frame, world_from_mid: &RigidTransform) -> FrameResult {
         let still = ExposureTrajectory::still(*world_from_mid);
-        let nothing = LevelOutcome::unchanged(crate::align::Estimate {
-            keyframe_from_camera: still,
-            brightness: BrightnessModel::default(),
-        });
+        let nothing = LevelOutcome::unchanged(Estimate::linear(still));
         let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.keep_keyframe();
         self.promote(world_from_mid, None, f32::MAX);
-        self.motion = Some(Motion::still(frame.timestamp, frame.exposure, *world_from_mid));
+        self.motion = Some(Motion::still(frame.timestamp, *world_from_mid));
         result.status = FrameStatus::Weak;
         result.is_keyframe = true;
         result
@@ -222,33 +253,69 @@ impl<'m> Tracker<'m> {
     /// Both are blurred alike, so they are aligned as they are; the motion between them then deblurs the keyframe,
     /// and the frame is aligned again.
     fn bootstrap(&mut self, frame: &Frame, motion: &Motion) -> (Aligned, Option<Revision>) {
+        let timing = self.timing;
+        // Rows and depth are sheared alike in both, as long as neither is corrected.
+        self.timing = FrameTiming::GLOBAL;
         let first = self.align(frame, motion, false, None);
+        self.timing = timing;
         if self.judge(&first.outcome, motion, frame) == FrameStatus::Lost {
             return (first, None);
         }
         let dt = frame.timestamp - motion.timestamp;
         let mid = first.outcome.estimate.keyframe_from_camera.mid();
-        let rate = RigidTransform::identity().tangent_to(&mid) / dt;
-        self.set_keyframe_motion(&(rate * motion.exposure));
-        let second = self.align(frame, motion, true, Some(mid));
-        let within = second.outcome.estimate.keyframe_from_camera.motion() / frame.exposure;
-        let refined = (rate * 2.0 - within) * motion.exposure;
-        let keyframe_from_camera =
-            ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &refined);
-        self.keyframe.keyframe_from_camera = Some(keyframe_from_camera);
+        let mut rate = RigidTransform::identity().tangent_to(&mid) / dt;
+        self.set_keyframe_path(&rate, &Vector6::zeros());
+        let mut second = self.align(frame, motion, self.config.align.blur, Some(mid));
+        let mut refined = self.rate_before(&second.outcome.estimate, dt);
+        if timing.reaches_outside() {
+            // The shear of the reference follows from its own velocity: align with the reference as it now is.
+            for _ in 0..BOOTSTRAP_ROUNDS {
+                rate = refined;
+                let within = second.outcome.estimate.keyframe_from_camera.motion() / self.span;
+                self.set_keyframe_path(&rate, &((within - rate) / dt));
+                let mid = second.outcome.estimate.keyframe_from_camera.mid();
+                second = self.align(frame, motion, self.config.align.blur, Some(mid));
+                refined = self.rate_before(&second.outcome.estimate, dt);
+            }
+        }
+        let path = self.path_of_keyframe(&refined, &Vector6::zeros());
+        if !timing.reaches_outside() {
+            self.keyframe.keyframe_from_camera = Some(path);
+        }
+        let exposure = exposure_of(&path, &self.keyframe.timing);
         let revision = Revision {
             index: self.keyframe.frame_index,
-            world_from_camera: keyframe_from_camera.seen_from(&self.keyframe.world_from_keyframe),
-            blur: self.blur_length(&keyframe_from_camera),
+            world_from_camera: exposure.seen_from(&self.keyframe.world_from_keyframe),
+            world_from_mid: self.keyframe.world_from_keyframe,
+            blur: self.blur_length(&exposure),
         };
         (second, Some(revision))
     }
 
-    fn set_keyframe_motion(&mut self, motion: &nalgebra::Vector6<f64>) {
-        let exposure = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), motion);
-        self.keyframe.keyframe_from_camera = Some(exposure);
-        self.keyframe.blur = self.blur_length(&exposure);
+    /// Velocity of the keyframe, per second, when a frame `dt` seconds later was aligned with `estimate`: the mean of the
+    /// velocities at both is that of the motion between them.
+    fn rate_before(&self, estimate: &Estimate, dt: f64) -> Vector6<f64> {
+        let between = RigidTransform::identity().tangent_to(&estimate.keyframe_from_camera.mid()) / dt;
+        between * 2.0 - estimate.keyframe_from_camera.motion() / self.span
+    }
+
+    /// The keyframe's path for a velocity and an acceleration at its middle, per second.
+    fn path_of_keyframe(&self, rate: &Vector6<f64>, acceleration: &Vector6<f64>) -> BowedTrajectory {
+        let span = self.keyframe_span;
+        let linear = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &(rate * span));
+        BowedTrajectory { linear, bow: acceleration * (0.5 * span * span) }
+    }
+
+    fn set_keyframe_path(&mut self, rate: &Vector6<f64>, acceleration: &Vector6<f64>) {
+        let path = self.path_of_keyframe(rate, acceleration);
+        self.keyframe.keyframe_from_camera = Some(path);
+        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
         self.sharpen_keyframe();
+    }
+
+    /// Whether the motion of a frame around its middle matters: it blurs the frame, or its parts have different times.
+    fn path_is_modelled(&self) -> bool {
+        (self.config.align.blur && self.timing.exposure * self.span > 0.0) || self.timing.reaches_outside()
     }
 
     /// Aligns the current frame with the keyframe; from `start` alone if it is given.
@@ -271,6 +338,7 @@ impl<'m> Tracker<'m> {
             depth: &self.depth,
             depth_level: self.config.surface_level,
             region: self.config.region,
+            timing: self.timing,
         };
         let task = FrameTask {
             alignment: Alignment {
@@ -283,7 +351,7 @@ impl<'m> Tracker<'m> {
             },
             motion: world_motion.seen_from(&self.keyframe.world_from_keyframe.inverse()),
             timestamp: frame.timestamp,
-            exposure: frame.exposure,
+            span: self.span,
             gyro: frame.angular_velocity,
             brightness: self.brightness,
             blur,
@@ -312,7 +380,7 @@ impl<'m> Tracker<'m> {
             overlap: outcome.patches_in_view as f32 / total,
             inliers: outcome.patches as f32 / total,
             flow: self.blur_length(&path),
-            blur: self.blur_length(&outcome.estimate.keyframe_from_camera),
+            blur: self.blur_length(&exposure_of(&outcome.estimate.path(), &self.timing)),
             depth_share: self.depth_share,
             speed: rate.fixed_rows::<3>(0).norm(),
             angular_speed: rate.fixed_rows::<3>(3).norm(),
@@ -329,22 +397,22 @@ impl<'m> Tracker<'m> {
     ) -> FrameResult {
         let outcome = &aligned.outcome;
         let evidence = self.evidence(outcome, motion, frame);
-        let world_from_camera =
-            outcome.estimate.keyframe_from_camera.seen_from(&self.keyframe.world_from_keyframe);
-        let world_from_mid = world_from_camera.mid();
+        let world_path = outcome.estimate.path().seen_from(&self.keyframe.world_from_keyframe);
+        let world_from_mid = world_path.linear.mid();
+        let world_from_camera = exposure_of(&world_path, &self.timing);
         let mut result = FrameResult::of(self.frames, frame.timestamp, world_from_camera, outcome);
+        result.world_from_mid = world_from_mid;
         result.status = status;
         result.blur = evidence.blur;
         result.inliers = evidence.inliers;
         result.reference_index = self.keyframe.frame_index;
         self.motion = Some(Motion {
             timestamp: frame.timestamp,
-            exposure: frame.exposure,
             reference_from_mid: world_from_mid,
             between_frames: motion.reference_from_mid.tangent_to(&world_from_mid)
                 / (frame.timestamp - motion.timestamp),
-            within_exposure: (self.config.align.blur && frame.exposure > 0.0)
-                .then(|| world_from_camera.motion() / frame.exposure),
+            interval: frame.timestamp - motion.timestamp,
+            within_exposure: self.path_is_modelled().then(|| world_path.linear.motion() / self.span),
         });
         self.brightness = outcome.estimate.brightness;
         if status == FrameStatus::Ok {
@@ -353,13 +421,16 @@ impl<'m> Tracker<'m> {
         let wanted = wants_keyframe(&evidence, self.keyframe.blur, self.config.camera.width);
         if status == FrameStatus::Ok && wanted {
             self.keep_keyframe();
-            let exposure = world_from_camera.seen_from(&world_from_mid.inverse());
-            self.promote(&world_from_mid, Some(exposure), evidence.blur);
+            let path = world_path.seen_from(&world_from_mid.inverse());
+            self.promote(&world_from_mid, Some(path), evidence.blur);
             result.is_keyframe = true;
         } else if status == FrameStatus::Ok {
             let camera = self.config.camera.at_level(self.config.surface_level);
-            let keyframe_from_mid = outcome.estimate.keyframe_from_camera.mid();
-            self.keyframe.fuse_depth(&self.depth, &keyframe_from_mid, &camera);
+            // Rows of depth at different times would have to be fused one by one.
+            if self.timing.depth_readout == 0.0 {
+                let keyframe_from_depth = outcome.estimate.path().at(0.5 + self.timing.depth_time);
+                self.keyframe.fuse_depth(&self.depth, &keyframe_from_depth, &camera);
+            }
         }
         result
     }
@@ -383,6 +454,7 @@ impl<'m> Tracker<'m> {
             depth: &self.depth,
             depth_level: 0,
             region: region.at_level(skip),
+            timing: FrameTiming::GLOBAL,
         };
         let camera = self.config.camera.at_level(skip);
         let found = self.recent.find(
@@ -399,7 +471,7 @@ impl<'m> Tracker<'m> {
             Some(world_from_mid) => {
                 self.motion = Some(Motion {
                     timestamp: motion.timestamp,
-                    ..Motion::still(frame.timestamp, frame.exposure, world_from_mid)
+                    ..Motion::still(frame.timestamp, world_from_mid)
                 });
                 true
             }
@@ -411,15 +483,18 @@ impl<'m> Tracker<'m> {
     fn promote(
         &mut self,
         world_from_keyframe: &RigidTransform,
-        keyframe_from_camera: Option<ExposureTrajectory>,
+        keyframe_from_camera: Option<BowedTrajectory>,
         blur: f32,
     ) {
         mem::swap(&mut self.pyramid, &mut self.keyframe.pyramid);
         mem::swap(&mut self.depth, &mut self.keyframe.depth);
         self.keyframe.world_from_keyframe = *world_from_keyframe;
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
+        self.keyframe.timing = self.timing;
+        self.keyframe_span = self.span;
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
+        self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
         self.keyframe.restart_surface();
         self.brightness = BrightnessModel::default();
         let deblurred = self.sharpen_keyframe();
@@ -428,17 +503,35 @@ impl<'m> Tracker<'m> {
         }
     }
 
-    /// Deblurs the keyframe with its own motion and selects its keypoints; `false` if there is nothing to do.
+    /// Gives the keyframe one time and deblurs it, with its own motion, and selects its keypoints; `false` if there is
+    /// nothing to do.
     fn sharpen_keyframe(&mut self) -> bool {
         self.work.image_pixels += self.pixels();
-        let Some(exposure) = self.keyframe.keyframe_from_camera else { return false };
+        let Some(path) = self.keyframe.keyframe_from_camera else { return false };
+        let timing = self.keyframe.timing;
+        if timing.reaches_outside() {
+            let keyframe = &mut self.keyframe;
+            self.rectify.rectify(
+                &path,
+                &timing,
+                &self.config.camera,
+                keyframe.pyramid.levels[0].pixels,
+                &mut keyframe.depth,
+            );
+            keyframe.restart_surface();
+            keyframe.pyramid.reduce();
+        }
         let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
         if self.config.reference == ReferenceMode::Raw || !worth {
-            return false;
+            if timing.reaches_outside() {
+                self.select_keypoints();
+            }
+            return timing.reaches_outside();
         }
         let Some(typical) = self.keyframe.depth.mean() else { return false };
         let longest = self.deblur.flow.fill(
-            &exposure,
+            &path,
+            &timing,
             &self.config.camera,
             &self.keyframe.planes,
             self.config.surface_level,

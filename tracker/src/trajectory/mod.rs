@@ -1,5 +1,7 @@
 //! The camera's motion while the shutter is open.
 
+mod bowed;
 mod exposure;
 
+pub use bowed::{BowedTrajectory, FrameTiming};
 pub use exposure::{ExposureTrajectory, SampleRule, left_from_right};

@@ -7,16 +7,13 @@
 use fearless_simd::prelude::*;
 use nalgebra::{SMatrix, SVector};
 
-use super::evaluate::{PatchCost, PhotometricSums, ResidualModel};
+use super::evaluate::{PatchCost, ResidualModel, RowSums};
 use super::kernel::{load, store};
 use super::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
-use super::problem::{BrightnessModel, LevelImage, PatchRows, PatchSite, PatchValues, ROW_LENGTH};
+use super::problem::{BrightnessModel, LevelImage, PatchRows, PatchSite, PatchValues};
 
 /// Vectors of a patch when a vector has the least number of lanes, four.
 const MAX_VECTORS: usize = PATCH_PIXELS / 4;
-
-/// The residual stands behind the row, as if it were one more column.
-const RESIDUAL: usize = ROW_LENGTH;
 
 /// Turns predictions into whitened, robustly weighted residuals.
 pub(super) struct Whitening<'a, S: Simd> {
@@ -90,30 +87,38 @@ impl<'a, S: Simd> Whitening<'a, S> {
 
 /// Aligned, so that no vector straddles two cache lines.
 #[repr(align(64))]
-struct Columns([[f32; PATCH_PIXELS]; ROW_LENGTH + 1]);
+struct Columns<const ROW: usize> {
+    row: [[f32; PATCH_PIXELS]; ROW],
+    residual: [f32; PATCH_PIXELS],
+}
 
-/// Normal equations while they are being summed.
-pub(super) struct NormalEquations<S: Simd> {
+/// Normal equations of rows with `ROW` columns, an even number, while they are being summed.
+pub(super) struct NormalEquations<S: Simd, const ROW: usize> {
     simd: S,
     /// The columns of one patch: row and residual of every pixel.
-    columns: Columns,
+    columns: Columns<ROW>,
     /// `lanes[i][j]`: products of columns i and j, of which those with `i <= j` are summed.
-    lanes: [[S::f32s; ROW_LENGTH + 1]; ROW_LENGTH],
-    totals: [[f64; ROW_LENGTH + 1]; ROW_LENGTH],
+    lanes: [[S::f32s; ROW]; ROW],
+    /// Products of the columns with the residual.
+    gradient_lanes: [S::f32s; ROW],
+    totals: [[f64; ROW]; ROW],
+    gradient: [f64; ROW],
     cost: f64,
     pixels: f64,
     pending_patches: usize,
 }
 
-impl<S: Simd> NormalEquations<S> {
+impl<S: Simd, const ROW: usize> NormalEquations<S, ROW> {
     #[inline(always)]
     pub(super) fn new(simd: S) -> Self {
         let zero = S::f32s::splat(simd, 0.0);
         Self {
             simd,
-            columns: Columns([[0.0; PATCH_PIXELS]; ROW_LENGTH + 1]),
-            lanes: [[zero; ROW_LENGTH + 1]; ROW_LENGTH],
-            totals: [[0.0; ROW_LENGTH + 1]; ROW_LENGTH],
+            columns: Columns { row: [[0.0; PATCH_PIXELS]; ROW], residual: [0.0; PATCH_PIXELS] },
+            lanes: [[zero; ROW]; ROW],
+            gradient_lanes: [zero; ROW],
+            totals: [[0.0; ROW]; ROW],
+            gradient: [0.0; ROW],
             cost: 0.0,
             pixels: 0.0,
             pending_patches: 0,
@@ -122,7 +127,12 @@ impl<S: Simd> NormalEquations<S> {
 
     /// Adds a patch and returns its robust cost.
     #[inline(always)]
-    pub(super) fn add(&mut self, whitening: &Whitening<S>, site: &PatchSite, rows: &PatchRows) -> PatchCost {
+    pub(super) fn add<const PATH: usize>(
+        &mut self,
+        whitening: &Whitening<S>,
+        site: &PatchSite,
+        rows: &PatchRows<PATH>,
+    ) -> PatchCost {
         let observed = observed_intensities(&whitening.current, site);
         let mut cost = S::f32s::splat(self.simd, 0.0);
         let mut count = cost;
@@ -146,40 +156,50 @@ impl<S: Simd> NormalEquations<S> {
 
     /// Row and residual, both times the square root of the weight.
     #[inline(always)]
-    fn store_columns(&mut self, gain: f32, whitened: &Whitened<S>, rows: &PatchRows, k: usize) {
+    fn store_columns<const PATH: usize>(
+        &mut self,
+        gain: f32,
+        whitened: &Whitened<S>,
+        rows: &PatchRows<PATH>,
+        k: usize,
+    ) {
         let root = whitened.weight.sqrt();
         let scale = root * whitened.inverse_sigma;
         let pose_scale = scale * gain;
-        let (pose, rest) = self.columns.0.split_at_mut(rows.pose.len());
+        let (pose, brightness) = self.columns.row.split_at_mut(rows.pose.len());
         for (column, derivative) in pose.iter_mut().zip(&rows.pose) {
             store(load(self.simd, derivative, k) * pose_scale, column, k);
         }
         let mean = load(self.simd, &rows.values.mean, k);
-        for (column, value) in rest.iter_mut().zip([mean * scale, scale, whitened.residual * root]) {
+        for (column, value) in brightness.iter_mut().zip([mean * scale, scale]) {
             store(value, column, k);
         }
+        store(whitened.residual * root, &mut self.columns.residual, k);
     }
 
     /// Two rows of the matrix at a time, so that every column that is read serves two products.
     #[inline(always)]
     fn add_products(&mut self) {
-        for i in (0..ROW_LENGTH).step_by(2) {
-            let [first, second] = [self.vectors(i), self.vectors(i + 1)];
+        let residual = self.vectors(&self.columns.residual);
+        for i in (0..ROW).step_by(2) {
+            let [first, second] = [i, i + 1].map(|column| self.vectors(&self.columns.row[column]));
             self.lanes[i][i] = self.add_dot(&first, &first, self.lanes[i][i]);
-            for j in i + 1..=RESIDUAL {
-                let column = self.vectors(j);
+            for j in i + 1..ROW {
+                let column = self.vectors(&self.columns.row[j]);
                 self.lanes[i][j] = self.add_dot(&first, &column, self.lanes[i][j]);
                 self.lanes[i + 1][j] = self.add_dot(&second, &column, self.lanes[i + 1][j]);
             }
+            self.gradient_lanes[i] = self.add_dot(&first, &residual, self.gradient_lanes[i]);
+            self.gradient_lanes[i + 1] = self.add_dot(&second, &residual, self.gradient_lanes[i + 1]);
         }
     }
 
     /// The vectors of a column; those past the end of the patch are never read.
     #[inline(always)]
-    fn vectors(&self, column: usize) -> [S::f32s; MAX_VECTORS] {
+    fn vectors(&self, column: &[f32; PATCH_PIXELS]) -> [S::f32s; MAX_VECTORS] {
         core::array::from_fn(
             #[inline(always)]
-            |vector| load(self.simd, &self.columns.0[column], vector * S::f32s::LEN % PATCH_PIXELS),
+            |vector| load(self.simd, column, vector * S::f32s::LEN % PATCH_PIXELS),
         )
     }
 
@@ -201,18 +221,22 @@ impl<S: Simd> NormalEquations<S> {
                 *lanes = S::f32s::splat(self.simd, 0.0);
             }
         }
+        for (total, lanes) in self.gradient.iter_mut().zip(&mut self.gradient_lanes) {
+            *total += f64::from(lanes.reduce_sum());
+            *lanes = S::f32s::splat(self.simd, 0.0);
+        }
         self.pending_patches = 0;
     }
 
     /// The sums over all patches added so far.
     #[inline(always)]
-    pub(super) fn finish(mut self) -> PhotometricSums {
+    pub(super) fn finish(mut self) -> RowSums<ROW> {
         self.flush();
-        PhotometricSums {
+        RowSums {
             cost: self.cost,
             pixels: self.pixels,
             hessian: SMatrix::from_fn(|i, j| self.totals[i.min(j)][i.max(j)]),
-            gradient: SVector::from_fn(|i, _| self.totals[i][RESIDUAL]),
+            gradient: SVector::from_fn(|i, _| self.gradient[i]),
         }
     }
 }

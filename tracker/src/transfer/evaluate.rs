@@ -6,7 +6,9 @@ use nalgebra::{SMatrix, SVector};
 
 use super::accumulate::{NormalEquations, Whitening};
 use super::kernel::TransferKernel;
-use super::problem::{PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem};
+use super::problem::{
+    BOWED_PATH, BOWED_ROW_LENGTH, LINEAR_PATH, PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem,
+};
 
 /// How residuals are weighted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,21 +31,27 @@ pub struct PatchCost {
     pub pixels: f32,
 }
 
+/// Sums of the normal equations of a path without bow.
+pub type PhotometricSums = RowSums<ROW_LENGTH>;
+
+/// Sums of the normal equations of a path with bow.
+pub type BowedSums = RowSums<BOWED_ROW_LENGTH>;
+
 /// Sums over all patches: `cost = sum rho(r)`, `hessian = sum w J^T J`, `gradient = sum w r J^T`, columns in the
-/// order of [`ROW_LENGTH`], left rotations.
+/// order of [`ROW_LENGTH`] or [`BOWED_ROW_LENGTH`], left rotations of the ends.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PhotometricSums {
+pub struct RowSums<const ROW: usize> {
     /// Robust cost.
     pub cost: f64,
     /// Number of valid pixels.
     pub pixels: f64,
     /// Gauss-Newton matrix.
-    pub hessian: SMatrix<f64, ROW_LENGTH, ROW_LENGTH>,
+    pub hessian: SMatrix<f64, ROW, ROW>,
     /// Gradient.
-    pub gradient: SVector<f64, ROW_LENGTH>,
+    pub gradient: SVector<f64, ROW>,
 }
 
-impl Default for PhotometricSums {
+impl<const ROW: usize> Default for RowSums<ROW> {
     fn default() -> Self {
         Self { cost: 0.0, pixels: 0.0, hessian: SMatrix::zeros(), gradient: SVector::zeros() }
     }
@@ -60,7 +68,11 @@ pub fn evaluate_cost(
     model: &ResidualModel,
     patches: &mut [PatchCost],
 ) -> PatchCost {
-    dispatch!(level, simd => cost_of_patches(simd, problem, sites, model, patches))
+    if problem.rows.step == 0.0 {
+        dispatch!(level, simd => cost_of_patches::<_, false>(simd, problem, sites, model, patches))
+    } else {
+        dispatch!(level, simd => cost_of_patches::<_, true>(simd, problem, sites, model, patches))
+    }
 }
 
 /// Normal equations and robust cost of all patches; see [`evaluate_cost`].
@@ -71,7 +83,19 @@ pub fn linearize(
     model: &ResidualModel,
     patches: &mut [PatchCost],
 ) -> PhotometricSums {
-    dispatch!(level, simd => sums_of_patches(simd, problem, sites, model, patches))
+    dispatch!(level, simd => sums_of_patches::<_, LINEAR_PATH, ROW_LENGTH>(simd, problem, sites, model, patches))
+}
+
+/// Normal equations and robust cost of all patches by the parameters of a path with bow, for rows that are exposed one
+/// after the other; see [`evaluate_cost`]. The views are those of [`super::RowBand::views`].
+pub fn linearize_bowed(
+    level: Level,
+    problem: &TransferProblem,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> BowedSums {
+    dispatch!(level, simd => sums_of_patches::<_, BOWED_PATH, BOWED_ROW_LENGTH>(simd, problem, sites, model, patches))
 }
 
 /// Predicted intensities of every patch; `out` has the length of `sites`.
@@ -102,7 +126,7 @@ pub fn accumulate_rows(
 }
 
 #[inline(always)]
-fn cost_of_patches<S: Simd>(
+fn cost_of_patches<S: Simd, const ROLLING: bool>(
     simd: S,
     problem: &TransferProblem,
     sites: &[PatchSite],
@@ -115,7 +139,7 @@ fn cost_of_patches<S: Simd>(
     let mut values = PatchValues::default();
     let (mut cost, mut pixels) = (0.0, 0.0);
     for (site, patch) in sites.iter().zip(patches) {
-        kernel.patch_values(site, &mut values);
+        kernel.patch_values::<ROLLING>(site, &mut values);
         *patch = whitening.cost(site, &values);
         cost += f64::from(patch.cost);
         pixels += f64::from(patch.pixels);
@@ -124,17 +148,17 @@ fn cost_of_patches<S: Simd>(
 }
 
 #[inline(always)]
-fn sums_of_patches<S: Simd>(
+fn sums_of_patches<S: Simd, const PATH: usize, const ROW: usize>(
     simd: S,
     problem: &TransferProblem,
     sites: &[PatchSite],
     model: &ResidualModel,
     patches: &mut [PatchCost],
-) -> PhotometricSums {
+) -> RowSums<ROW> {
     patches.fill(PatchCost::default());
-    let Some(mut kernel) = TransferKernel::new(simd, problem) else { return PhotometricSums::default() };
+    let Some(mut kernel) = TransferKernel::new(simd, problem) else { return RowSums::default() };
     let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
-    let mut rows = PatchRows::default();
+    let mut rows = PatchRows::<PATH>::default();
     let mut sums = NormalEquations::new(simd);
     for (site, patch) in sites.iter().zip(patches) {
         kernel.patch_rows(site, &mut rows);
@@ -154,7 +178,7 @@ fn values_of_patches<S: Simd>(
         return out.fill(PatchValues::default());
     };
     for (site, values) in sites.iter().zip(out) {
-        kernel.patch_values(site, values);
+        kernel.patch_values::<false>(site, values);
     }
 }
 

@@ -22,7 +22,7 @@ use fearless_simd::prelude::*;
 
 use super::bilinear::{BilinearSampler, Cell, Sampled};
 use super::pattern::{PATCH_PIXELS, PATTERN_DU_F32, PATTERN_DV_F32};
-use super::problem::{PatchRows, PatchSite, PatchValues, TransferProblem};
+use super::problem::{LINEAR_PATH, PatchRows, PatchSite, PatchValues, TransferProblem};
 use super::reference::{MIN_PLANE_DISTANCE, MIN_RAY_Z};
 use super::virtual_view::{MAX_VIRTUAL_VIEWS, VirtualView};
 
@@ -40,6 +40,8 @@ struct PatchView {
     shift: [f32; 2],
     /// `(1 - s)/w` and `s/w`, with `w` the distance from the virtual camera to the plane.
     end_weights: [f32; 2],
+    /// `(s - 1/2)^2`, and the same over `w`; only where rows are exposed one after the other.
+    bow: [f32; 2],
 }
 
 /// One vector of pixels of a virtual view, located in the reference image.
@@ -58,6 +60,9 @@ struct RowSums<S: Simd> {
     translation_end: [S::f32s; 3],
     rotation: [S::f32s; 3],
     rotation_end: [S::f32s; 3],
+    /// Sums for the bow; not touched without it.
+    translation_bow: [S::f32s; 3],
+    rotation_bow: [S::f32s; 3],
 }
 
 /// The transfer of all patches of one evaluation.
@@ -96,10 +101,10 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
         })
     }
 
-    /// Predicted intensities of a patch.
+    /// Predicted intensities of a patch; `ROLLING` where the problem's rows are exposed one after the other.
     #[inline(always)]
-    pub(super) fn patch_values(&mut self, site: &PatchSite, out: &mut PatchValues) {
-        if !self.prepare(site) {
+    pub(super) fn patch_values<const ROLLING: bool>(&mut self, site: &PatchSite, out: &mut PatchValues) {
+        if !self.prepare::<ROLLING>(site) {
             *out = PatchValues::default();
             return;
         }
@@ -115,11 +120,13 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
         }
     }
 
-    /// Predicted intensities of a patch and their derivatives by the poses at shutter opening and closing, for
-    /// left rotations.
+    /// Predicted intensities of a patch and their derivatives by the parameters of the path, for left rotations of its
+    /// ends; with a bow where `PATH` has room for it, and then for rows that are exposed one after the other.
     #[inline(always)]
-    pub(super) fn patch_rows(&mut self, site: &PatchSite, out: &mut PatchRows) {
-        if !self.prepare(site) {
+    pub(super) fn patch_rows<const PATH: usize>(&mut self, site: &PatchSite, out: &mut PatchRows<PATH>) {
+        let prepared =
+            if PATH > LINEAR_PATH { self.prepare::<true>(site) } else { self.prepare::<false>(site) };
+        if !prepared {
             *out = PatchRows::default();
             return;
         }
@@ -129,15 +136,27 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
                 site,
                 k,
                 #[inline(always)]
-                |view, patch_view, located, sampled| sums.add(view, patch_view, located, sampled),
+                |view, patch_view, located, sampled| sums.add::<PATH>(view, patch_view, located, sampled),
             );
+            if PATH > LINEAR_PATH {
+                sums.delay(self.delay(site));
+            }
             self.store_rows(k, &sums, valid, out);
         }
     }
 
-    /// Computes what patch and views share. False if the plane is behind or too near to a virtual camera.
+    /// Normalised time by which the row of a patch is exposed later than the views say.
     #[inline(always)]
-    fn prepare(&mut self, site: &PatchSite) -> bool {
+    fn delay(&self, site: &PatchSite) -> f32 {
+        (f32::from(site.v) - self.problem.rows.centre) * self.problem.rows.step
+    }
+
+    /// Computes what patch and views share. False if the plane is behind or too near to a virtual camera.
+    ///
+    /// A patch that is exposed later than the row of the views sees them moved on by their velocity: within a band of
+    /// rows the second order is far below a hundredth of a pixel.
+    #[inline(always)]
+    fn prepare<const ROLLING: bool>(&mut self, site: &PatchSite) -> bool {
         let [fx, fy] = self.problem.focal;
         let [cx, cy] = self.problem.centre;
         let x = (f32::from(site.u) - cx) * self.inverse_focal[0];
@@ -145,17 +164,33 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
         let rho = site.inverse_depth;
         let depth = 1.0 / rho;
         let mut in_front = rho > 0.0;
+        let delay = self.delay(site);
         for (view, patch_view) in self.views.iter().zip(&mut self.patch_views) {
-            let distance = depth - view.position[2];
+            let mut ray: [f32; 3] = core::array::from_fn(|i| {
+                view.rotation[i][0] * x + view.rotation[i][1] * y + view.rotation[i][2]
+            });
+            let (mut position, mut time) = (view.position, view.time);
+            if ROLLING {
+                let [shift, turn] = view.velocity;
+                let [rx, ry, rz] = ray;
+                let cross =
+                    [turn[1] * rz - turn[2] * ry, turn[2] * rx - turn[0] * rz, turn[0] * ry - turn[1] * rx];
+                for i in 0..3 {
+                    ray[i] += delay * cross[i];
+                    position[i] += delay * shift[i];
+                }
+                time += delay;
+            }
+            let distance = depth - position[2];
             in_front &= distance > MIN_PLANE_DISTANCE;
             let per_distance = 1.0 / distance;
+            let bow = (time - 0.5) * (time - 0.5);
             *patch_view = PatchView {
-                ray: core::array::from_fn(|i| {
-                    view.rotation[i][0] * x + view.rotation[i][1] * y + view.rotation[i][2]
-                }),
+                ray,
                 slope: [fx * rho * distance, fy * rho * distance],
-                shift: [cx + fx * rho * view.position[0], cy + fy * rho * view.position[1]],
-                end_weights: [(1.0 - view.time) * per_distance, view.time * per_distance],
+                shift: [cx + fx * rho * position[0], cy + fy * rho * position[1]],
+                end_weights: [(1.0 - time) * per_distance, time * per_distance],
+                bow: [bow, bow * per_distance],
             };
         }
         in_front
@@ -204,12 +239,22 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     }
 
     #[inline(always)]
-    fn store_rows(&self, k: usize, sums: &RowSums<S>, valid: S::mask32s, out: &mut PatchRows) {
-        let columns = sums.columns();
+    fn store_rows<const PATH: usize>(
+        &self,
+        k: usize,
+        sums: &RowSums<S>,
+        valid: S::mask32s,
+        out: &mut PatchRows<PATH>,
+    ) {
+        let columns = sums.columns::<PATH>();
         // Any number that is not finite makes the total so; a tree, because a chain of twelve would be waited for.
         let [a, b, c, d]: [S::f32s; 4] =
             core::array::from_fn(|i| columns[i] + columns[i + 4] + columns[i + 8]);
-        let valid = valid & ((a + b) + (c + d) + sums.value).is_finite();
+        let mut total = (a + b) + (c + d) + sums.value;
+        for &column in columns.iter().skip(LINEAR_PATH) {
+            total += column;
+        }
+        let valid = valid & total.is_finite();
         self.store_values(k, sums.value, valid, &mut out.values);
         let (zero, scale) = (S::f32s::splat(self.simd, 0.0), S::f32s::splat(self.simd, self.scale));
         for (&column, pose) in columns.iter().zip(&mut out.pose) {
@@ -248,13 +293,21 @@ impl<S: Simd> RowSums<S> {
             translation_end: [zero; 3],
             rotation: [zero; 3],
             rotation_end: [zero; 3],
+            translation_bow: [zero; 3],
+            rotation_bow: [zero; 3],
         }
     }
 
     /// Adds one virtual view. With `A = g_u m_u`, `C = g_v m_v` and `e = a A + b C`, the row for a left rotation
     /// is `(-(b e + C), a e + A, a C - b A)` and that for a translation `(A, C, -e)/w`.
     #[inline(always)]
-    fn add(&mut self, view: &VirtualView, patch_view: &PatchView, t: &Located<S>, sampled: &Sampled<S>) {
+    fn add<const PATH: usize>(
+        &mut self,
+        view: &VirtualView,
+        patch_view: &PatchView,
+        t: &Located<S>,
+        sampled: &Sampled<S>,
+    ) {
         let along_u = sampled.gradient_u * patch_view.slope[0];
         let along_v = sampled.gradient_v * patch_view.slope[1];
         let e = t.a.mul_add(along_u, t.b * along_v);
@@ -272,18 +325,38 @@ impl<S: Simd> RowSums<S> {
                 self.rotation_end[j] = rotation[i].mul_add(view.blend_left[i][j], self.rotation_end[j]);
             }
         }
+        if PATH > LINEAR_PATH {
+            for i in 0..3 {
+                self.translation_bow[i] = translation[i].mul_add(patch_view.bow[1], self.translation_bow[i]);
+                let turn = rotation[i] * patch_view.bow[0];
+                for j in 0..3 {
+                    self.rotation_bow[j] = turn.mul_add(view.bow_blend_left[i][j], self.rotation_bow[j]);
+                }
+            }
+        }
     }
 
-    /// The sums in the order of the row: start translation and rotation, end translation and rotation.
+    /// Moves the blend of the rotations on by `delay` of normalised time, where it grows by the identity per unit.
     #[inline(always)]
-    fn columns(&self) -> [S::f32s; 12] {
+    fn delay(&mut self, delay: f32) {
+        for (end, &rotation) in self.rotation_end.iter_mut().zip(&self.rotation) {
+            *end = rotation.mul_add(delay, *end);
+        }
+    }
+
+    /// The sums in the order of the row: start translation and rotation, end translation and rotation, those of the
+    /// bow.
+    #[inline(always)]
+    fn columns<const PATH: usize>(&self) -> [S::f32s; PATH] {
         let (t0, t1, phi1) = (&self.translation_start, &self.translation_end, &self.rotation_end);
         let phi0: [S::f32s; 3] = core::array::from_fn(|i| self.rotation[i] - phi1[i]);
         core::array::from_fn(|i| match i / 3 {
             0 => t0[i % 3],
             1 => phi0[i % 3],
             2 => t1[i % 3],
-            _ => phi1[i % 3],
+            3 => phi1[i % 3],
+            4 => self.translation_bow[i % 3],
+            _ => self.rotation_bow[i % 3],
         })
     }
 }

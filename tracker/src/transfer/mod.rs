@@ -15,10 +15,13 @@ pub mod reference;
 mod virtual_view;
 
 pub use evaluate::{
-    PatchCost, PhotometricSums, ResidualModel, accumulate_rows, evaluate_cost, huber, linearize,
-    transfer_rows, transfer_values,
+    BowedSums, PatchCost, PhotometricSums, ResidualModel, accumulate_rows, evaluate_cost, huber, linearize,
+    linearize_bowed, transfer_rows, transfer_values,
 };
 pub use pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 pub use pixel::{TransferredPixel, transfer_pixel};
-pub use problem::{BrightnessModel, PatchRows, PatchSite, PatchValues, ROW_LENGTH, TransferProblem};
-pub use virtual_view::{MAX_VIRTUAL_VIEWS, VirtualView, virtual_views};
+pub use problem::{
+    BOWED_PATH, BOWED_ROW_LENGTH, BrightnessModel, LINEAR_PATH, PatchRows, PatchSite, PatchValues,
+    ROW_LENGTH, RowTimes, TransferProblem,
+};
+pub use virtual_view::{MAX_VIRTUAL_VIEWS, RowBand, VirtualView, virtual_views};

@@ -6,9 +6,19 @@ use super::pattern::PATCH_PIXELS;
 use super::virtual_view::VirtualView;
 pub(super) use crate::image::LevelImage;
 
+/// Parameters of a path without bow: translation and left rotation of start and of end.
+pub const LINEAR_PATH: usize = 12;
+
+/// Parameters of a path with bow: those of [`LINEAR_PATH`], then the bow's translation and rotation in the camera.
+pub const BOWED_PATH: usize = 18;
+
 /// Columns of a Jacobian row: start translation, start rotation, end translation, end rotation (three each, left
 /// rotations), gain, offset.
-pub const ROW_LENGTH: usize = 14;
+pub const ROW_LENGTH: usize = LINEAR_PATH + 2;
+
+/// Columns of a Jacobian row of a path with bow: as [`ROW_LENGTH`], with the bow (translation, rotation in the camera)
+/// before gain and offset.
+pub const BOWED_ROW_LENGTH: usize = BOWED_PATH + 2;
 
 /// A keypoint as it is observed in the current frame; frozen while one linearisation is tried out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -52,6 +62,18 @@ pub struct TransferProblem<'a> {
     pub views: &'a [VirtualView],
     /// Photometric relation.
     pub brightness: BrightnessModel,
+    /// How the time of a row differs from that of the views.
+    pub rows: RowTimes,
+}
+
+/// Rows that are exposed one after the other: `views` are those of one row, a patch in row `v` of the current image is
+/// exposed `(v - centre) step` later, in units of normalised time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RowTimes {
+    /// Row whose views are given.
+    pub centre: f32,
+    /// Normalised time from one row to the next; 0 for a global shutter.
+    pub step: f32,
 }
 
 /// Predicted intensities of a patch, before gain and offset; aligned for whole vectors.
@@ -73,16 +95,16 @@ impl Default for PatchValues {
 /// Predicted intensities and their derivatives; aligned for whole vectors.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C, align(64))]
-pub struct PatchRows {
+pub struct PatchRows<const PATH: usize = LINEAR_PATH> {
     /// Predicted intensities.
     pub values: PatchValues,
-    /// Derivative of the mean by the twelve pose parameters (left rotations): `pose[column][pixel]`; zero where
-    /// the pixel is not valid.
-    pub pose: [[f32; PATCH_PIXELS]; 12],
+    /// Derivative of the mean by the parameters of the path, in the order of [`LINEAR_PATH`] or [`BOWED_PATH`]:
+    /// `pose[column][pixel]`; zero where the pixel is not valid.
+    pub pose: [[f32; PATCH_PIXELS]; PATH],
 }
 
-impl Default for PatchRows {
+impl<const PATH: usize> Default for PatchRows<PATH> {
     fn default() -> Self {
-        Self { values: PatchValues::default(), pose: [[0.0; PATCH_PIXELS]; 12] }
+        Self { values: PatchValues::default(), pose: [[0.0; PATCH_PIXELS]; PATH] }
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV};
 use crate::geometry::PinholeCamera;
-use crate::trajectory::{ExposureTrajectory, SampleRule};
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming, SampleRule};
 
 /// Upper bound of the virtual views of one exposure.
 pub const MAX_VIRTUAL_VIEWS: usize = 32;
@@ -24,7 +24,11 @@ pub struct VirtualView {
     pub position: [f32; 3],
     /// Rows of `B_L` with `phi_s = (I - B_L) phi_start + B_L phi_end`.
     pub blend_left: [[f32; 3]; 3],
-    /// Normalised time of the view in the exposure, `[0, 1]`.
+    /// Rows of C with `phi_s = (s - 1/2)^2 C d(bow)`, see [`BowedTrajectory::bow_blend_left`].
+    pub bow_blend_left: [[f32; 3]; 3],
+    /// Velocity per unit of normalised time: translation in the reference frame, left rotation.
+    pub velocity: [[f32; 3]; 2],
+    /// Normalised time of the view: `[0, 1]` within the exposure of a global shutter.
     pub time: f32,
 }
 
@@ -34,22 +38,114 @@ impl VirtualView {
     pub fn new(reference_from_camera: &ExposureTrajectory, s: f64, camera: &PinholeCamera) -> Self {
         let pose = reference_from_camera.at(s);
         let rotation = pose.rotation_matrix();
-        let mut pattern_offset = [[0.0; PATCH_PIXELS]; 3];
-        for k in 0..PATCH_PIXELS {
-            let ray_offset =
-                Vector3::new(f64::from(PATTERN_DU[k]) / camera.fx, f64::from(PATTERN_DV[k]) / camera.fy, 0.0);
-            let rotated = rotation * ray_offset;
-            for (component, offsets) in pattern_offset.iter_mut().enumerate() {
-                offsets[k] = rotated[component] as f32;
-            }
-        }
         Self {
+            pattern_offset: pattern_offset(&rotation, camera, &Vector3::zeros()),
             rotation: rows(&rotation),
-            position: [pose.translation.x as f32, pose.translation.y as f32, pose.translation.z as f32],
+            position: single(&pose.translation),
             blend_left: rows(&reference_from_camera.rotation_blend_left(s)),
+            bow_blend_left: [[0.0; 3]; 3],
+            velocity: [[0.0; 3]; 2],
             time: s as f32,
-            pattern_offset,
         }
+    }
+
+    /// The view at normalised time `s` of a path with bow whose rows follow each other by `row_step` of normalised time.
+    ///
+    /// Within a patch that shears the pattern. The part of it that depends on the patch's depth takes that of a surface
+    /// at `inverse_depth`: over the four rows of half a patch the difference is a hundredth of a pixel.
+    #[must_use]
+    pub fn of_row(
+        path: &BowedTrajectory,
+        s: f64,
+        camera: &PinholeCamera,
+        row_step: f64,
+        inverse_depth: f64,
+    ) -> Self {
+        let pose = path.at(s);
+        let rotation = pose.rotation_matrix();
+        let velocity = path.velocity_left(s);
+        let (shift, turn) =
+            (Vector3::from(velocity.fixed_rows::<3>(0)), Vector3::from(velocity.fixed_rows::<3>(3)));
+        let per_row = (turn.cross(&rotation.column(2)) + shift * inverse_depth) * row_step;
+        Self {
+            pattern_offset: pattern_offset(&rotation, camera, &per_row),
+            rotation: rows(&rotation),
+            position: single(&pose.translation),
+            blend_left: rows(&path.linear.rotation_blend_left(s)),
+            bow_blend_left: rows(&path.bow_blend_left(s)),
+            velocity: [single(&shift), single(&turn)],
+            time: s as f32,
+        }
+    }
+}
+
+/// `R (du/fx, dv/fy, 0) + dv per_row` of every pattern pixel, component by component.
+fn pattern_offset(
+    rotation: &Matrix3<f64>,
+    camera: &PinholeCamera,
+    per_row: &Vector3<f64>,
+) -> [[f32; PATCH_PIXELS]; 3] {
+    let mut pattern_offset = [[0.0; PATCH_PIXELS]; 3];
+    for k in 0..PATCH_PIXELS {
+        let (du, dv) = (f64::from(PATTERN_DU[k]), f64::from(PATTERN_DV[k]));
+        let rotated = rotation * Vector3::new(du / camera.fx, dv / camera.fy, 0.0) + per_row * dv;
+        for (component, offsets) in pattern_offset.iter_mut().enumerate() {
+            offsets[k] = rotated[component] as f32;
+        }
+    }
+    pattern_offset
+}
+
+fn single(v: &Vector3<f64>) -> [f32; 3] {
+    [v.x as f32, v.y as f32, v.z as f32]
+}
+
+/// A band of rows of the current image that shares its virtual views.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RowBand {
+    /// First row.
+    pub first: usize,
+    /// Row after the last.
+    pub end: usize,
+    /// Rows of the image.
+    pub height: usize,
+}
+
+impl RowBand {
+    /// Band `index` of `count` of an image of `height` rows.
+    #[must_use]
+    pub fn new(index: usize, count: usize, height: usize) -> Self {
+        Self { first: index * height / count, end: (index + 1) * height / count, height }
+    }
+
+    /// All rows of an image of `height` rows.
+    #[must_use]
+    pub fn whole(height: usize) -> Self {
+        Self { first: 0, end: height, height }
+    }
+
+    /// The row in the middle; may lie between two.
+    #[must_use]
+    pub fn centre(&self) -> f64 {
+        0.5 * (self.first + self.end) as f64 - 0.5
+    }
+
+    /// The `count` virtual views of the middle row of the band for a frame that is exposed as `timing` says; at most
+    /// [`MAX_VIRTUAL_VIEWS`] are made.
+    #[must_use]
+    pub fn views(
+        &self,
+        path: &BowedTrajectory,
+        timing: &FrameTiming,
+        count: usize,
+        camera: &PinholeCamera,
+        inverse_depth: f64,
+    ) -> ArrayVec<VirtualView, MAX_VIRTUAL_VIEWS> {
+        let count = count.clamp(1, MAX_VIRTUAL_VIEWS);
+        let middle = timing.row_time(self.centre(), self.height);
+        let row_step = timing.readout / self.height as f64;
+        let time = |k: usize| middle + timing.exposure * (SampleRule::Midpoint.time(k, count) - 0.5);
+        (0..count).map(|k| VirtualView::of_row(path, time(k), camera, row_step, inverse_depth)).collect()
     }
 }
 

@@ -120,6 +120,11 @@ impl<'m> Keyframe<'m> {
         self.planes.fit(&self.depth);
     }
 
+    /// Fits the planes again after `depth` was moved as a whole; measurements keep their number.
+    pub fn refit_surface(&mut self) {
+        self.planes.fit(&self.depth);
+    }
+
     /// Averages in the depth map of a frame at `keyframe_from_camera`; `camera` is that of the depth maps. Planes
     /// and keypoint depths follow whenever the number of frames has doubled, from two on.
     pub fn fuse_depth(

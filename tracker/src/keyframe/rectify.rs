@@ -11,7 +11,7 @@ use crate::align::MAX_BANDS;
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::LevelImage;
 use crate::surface::InverseDepthMap;
-use crate::trajectory::{BowedTrajectory, FrameTiming};
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Rounds of looking where a point was seen when the row of the last guess was exposed. Each leaves the row's motion per
@@ -100,6 +100,32 @@ impl<'m> RectifyScratch<'m> {
         if !self.depth.is_empty() && (timing.depth_time != 0.0 || timing.depth_readout != 0.0) {
             self.rectify_depth(keyframe_from_camera, timing, camera, depth);
         }
+        self.rectify_image(keyframe_from_camera, timing, camera, image, depth)
+    }
+
+    /// Moves `depth` as if the camera that measured it had been at `keyframe_from_camera` instead of in the keyframe.
+    pub fn move_depth(
+        &mut self,
+        keyframe_from_camera: &RigidTransform,
+        camera: &PinholeCamera,
+        depth: &mut InverseDepthMap,
+    ) {
+        if !self.depth.is_empty() {
+            self.depth.copy_from_slice(depth.values);
+            let still = BowedTrajectory::without_bow(ExposureTrajectory::still(*keyframe_from_camera));
+            self.rectify_depth(&still, &FrameTiming::GLOBAL, camera, depth);
+        }
+    }
+
+    /// Gives the remembered picture another path of the keyframe, see [`Self::rectify`]; depth stays.
+    pub fn rectify_image(
+        &mut self,
+        keyframe_from_camera: &BowedTrajectory,
+        timing: &FrameTiming,
+        camera: &PinholeCamera,
+        image: &mut [f32],
+        depth: &InverseDepthMap,
+    ) -> f32 {
         if self.image.is_empty() || !timing.is_rolling() {
             return 0.0;
         }

@@ -5,6 +5,7 @@ mod coarse_to_fine;
 mod config;
 mod frame;
 mod history;
+mod keyframe_path;
 mod outside;
 mod policy;
 mod recovery;

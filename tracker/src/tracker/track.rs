@@ -9,6 +9,7 @@ use super::coarse_to_fine::{Aligned, FrameTask};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::Frame;
 use super::history::Motion;
+use super::keyframe_path::VelocityError;
 use super::policy::{Evidence, Typical, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
 use super::result::{FrameResult, FrameStatus, Revision};
@@ -37,6 +38,10 @@ const MAX_DEPTH_OFFSET: f64 = 0.2;
 
 /// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
 const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
+
+/// Standard deviation of a keyframe's velocity and of one between mid poses, as a shear in pixels over the path of a frame.
+const KEYFRAME_SHEAR: f64 = 2.0;
+const MID_POSE_SHEAR: f64 = 0.3;
 
 /// Alignments of the second frame with a first one whose own shear becomes known by them.
 const BOOTSTRAP_ROUNDS: usize = 3;
@@ -69,6 +74,8 @@ pub struct Tracker<'m> {
     span: f64,
     /// Seconds that the path of the keyframe's frame spans.
     keyframe_span: f64,
+    /// What is known about the error of the keyframe's velocity.
+    velocity_error: VelocityError,
     /// Motion in the world; `None` before the first usable frame.
     pub(super) motion: Option<Motion>,
     pub(super) brightness: BrightnessModel,
@@ -122,6 +129,7 @@ impl<'m> Tracker<'m> {
             timing: FrameTiming::GLOBAL,
             span: 0.0,
             keyframe_span: 0.0,
+            velocity_error: VelocityError::unknown(&Vector6::repeat(1.0)),
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),
@@ -415,6 +423,7 @@ impl<'m> Tracker<'m> {
             within_exposure: self.path_is_modelled().then(|| world_path.linear.motion() / self.span),
         });
         self.brightness = outcome.estimate.brightness;
+        let correction = self.observe_velocity_error(frame, motion, &world_from_mid);
         if status == FrameStatus::Ok {
             self.typical.learn(outcome);
         }
@@ -424,6 +433,8 @@ impl<'m> Tracker<'m> {
             let path = world_path.seen_from(&world_from_mid.inverse());
             self.promote(&world_from_mid, Some(path), evidence.blur);
             result.is_keyframe = true;
+        } else if let Some(correction) = correction {
+            self.correct_keyframe_path(&correction);
         } else if status == FrameStatus::Ok {
             let camera = self.config.camera.at_level(self.config.surface_level);
             // Rows of depth at different times would have to be fused one by one.
@@ -433,6 +444,67 @@ impl<'m> Tracker<'m> {
             }
         }
         result
+    }
+
+    /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
+    /// correction of the keyframe's velocity, per second in the keyframe, when it is time for one.
+    fn observe_velocity_error(
+        &mut self,
+        frame: &Frame,
+        motion: &Motion,
+        world_from_mid: &RigidTransform,
+    ) -> Option<Vector6<f64>> {
+        let path_rate = motion.within_exposure.filter(|_| self.keyframe.timing.is_rolling())?;
+        let dt = frame.timestamp - motion.timestamp;
+        let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
+        if !motion.interval.is_finite() {
+            return None;
+        }
+        let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
+        let bend = next - motion.between_frames;
+        let floor = self.velocity_sigma(MID_POSE_SHEAR, self.span);
+        let sigma = Vector6::from_fn(|i, _| {
+            let group = if i < 3 { 0 } else { 3 };
+            0.3 * bend.fixed_rows::<3>(group).norm() + floor[i]
+        });
+        let mut difference = path_rate - slope;
+        let turn = self.keyframe.world_from_keyframe.rotation.inverse();
+        let shift = turn * nalgebra::Vector3::from(difference.fixed_rows::<3>(0));
+        difference.fixed_rows_mut::<3>(0).copy_from(&shift);
+        self.velocity_error.observe(&difference, &sigma)
+    }
+
+    /// Standard deviations of a velocity, per second, that moves the picture by `pixels` within `span` seconds.
+    fn velocity_sigma(&self, pixels: f64, span: f64) -> Vector6<f64> {
+        let angle = pixels / self.config.camera.fx / span.max(1e-6);
+        let shift = angle / typical_inverse_depth(self.keyframe.finest_keypoints()).max(0.02);
+        Vector6::new(shift, shift, shift, angle, angle, angle)
+    }
+
+    /// Changes the keyframe's velocity by `correction` and shears picture and depth anew.
+    fn correct_keyframe_path(&mut self, correction: &Vector6<f64>) {
+        let Some(old) = self.keyframe.keyframe_from_camera else { return };
+        let motion = old.linear.motion() + correction * self.keyframe_span;
+        let mid = RigidTransform::identity();
+        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), ..old };
+        let depth_time = 0.5 + self.keyframe.timing.depth_time;
+        let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
+        self.keyframe.keyframe_from_camera = Some(path);
+        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
+        self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
+        self.keyframe.refit_surface();
+        let pixels = &mut *self.keyframe.pyramid.levels[0].pixels;
+        self.rectify.rectify_image(
+            &path,
+            &self.keyframe.timing,
+            &self.config.camera,
+            pixels,
+            &self.keyframe.depth,
+        );
+        self.keyframe.pyramid.reduce();
+        if !self.deblur_keyframe(&path) {
+            self.select_keypoints();
+        }
     }
 
     /// Holds the last good pose.
@@ -492,6 +564,7 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
         self.keyframe.timing = self.timing;
         self.keyframe_span = self.span;
+        self.velocity_error = VelocityError::unknown(&self.velocity_sigma(KEYFRAME_SHEAR, self.span));
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
         self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
@@ -521,17 +594,25 @@ impl<'m> Tracker<'m> {
             keyframe.restart_surface();
             keyframe.pyramid.reduce();
         }
+        if self.deblur_keyframe(&path) {
+            return true;
+        }
+        if timing.reaches_outside() {
+            self.select_keypoints();
+        }
+        timing.reaches_outside()
+    }
+
+    /// Deblurs the keyframe with its path and selects its keypoints; `false` if it is not worth it.
+    fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
         let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
         if self.config.reference == ReferenceMode::Raw || !worth {
-            if timing.reaches_outside() {
-                self.select_keypoints();
-            }
-            return timing.reaches_outside();
+            return false;
         }
         let Some(typical) = self.keyframe.depth.mean() else { return false };
         let longest = self.deblur.flow.fill(
-            &path,
-            &timing,
+            path,
+            &self.keyframe.timing,
             &self.config.camera,
             &self.keyframe.planes,
             self.config.surface_level,

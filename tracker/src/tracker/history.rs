@@ -18,6 +18,8 @@ pub(super) struct Motion {
     pub(super) interval: f64,
     /// Motion during the exposure; `None` while it is unknown.
     pub(super) within_exposure: Option<Vector6<f64>>,
+    /// Acceleration during the exposure, per square second; zero where it is not estimated.
+    pub(super) acceleration: Vector6<f64>,
 }
 
 /// Gap in seconds beyond which the motion before says nothing about the motion after.
@@ -42,6 +44,7 @@ impl Motion {
             between_frames: Vector6::zeros(),
             interval: f64::INFINITY,
             within_exposure: None,
+            acceleration: Vector6::zeros(),
         }
     }
 
@@ -51,6 +54,7 @@ impl Motion {
             reference_from_mid: other_from_reference.compose(&self.reference_from_mid),
             between_frames: rotated(other_from_reference, &self.between_frames),
             within_exposure: self.within_exposure.map(|rate| rotated(other_from_reference, &rate)),
+            acceleration: rotated(other_from_reference, &self.acceleration),
             ..*self
         }
     }
@@ -130,7 +134,7 @@ impl Motion {
     }
 }
 
-fn rotated(a_from_b: &RigidTransform, rate: &Vector6<f64>) -> Vector6<f64> {
+pub(super) fn rotated(a_from_b: &RigidTransform, rate: &Vector6<f64>) -> Vector6<f64> {
     let mut rotated = *rate;
     let translation = a_from_b.rotation * rate.fixed_rows::<3>(0).into_owned();
     rotated.fixed_rows_mut::<3>(0).copy_from(&translation);

@@ -8,8 +8,8 @@ use nalgebra::Vector6;
 use super::coarse_to_fine::{Aligned, FrameTask};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::Frame;
-use super::history::Motion;
-use super::keyframe_path::VelocityError;
+use super::history::{Motion, rotated};
+use super::keyframe_path::{PathError, PathRate};
 use super::policy::{Evidence, Typical, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
 use super::result::{FrameResult, FrameStatus, Revision};
@@ -74,8 +74,8 @@ pub struct Tracker<'m> {
     span: f64,
     /// Seconds that the path of the keyframe's frame spans.
     keyframe_span: f64,
-    /// What is known about the error of the keyframe's velocity.
-    velocity_error: VelocityError,
+    /// What is known about the error of the keyframe's path.
+    path_error: PathError,
     /// Motion in the world; `None` before the first usable frame.
     pub(super) motion: Option<Motion>,
     pub(super) brightness: BrightnessModel,
@@ -129,7 +129,7 @@ impl<'m> Tracker<'m> {
             timing: FrameTiming::GLOBAL,
             span: 0.0,
             keyframe_span: 0.0,
-            velocity_error: VelocityError::unknown(&Vector6::repeat(1.0)),
+            path_error: PathError::unknown(&PathRate::repeat(1.0)),
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),
@@ -421,9 +421,10 @@ impl<'m> Tracker<'m> {
                 / (frame.timestamp - motion.timestamp),
             interval: frame.timestamp - motion.timestamp,
             within_exposure: self.path_is_modelled().then(|| world_path.linear.motion() / self.span),
+            acceleration: world_path.bow * (2.0 / (self.span * self.span).max(f64::MIN_POSITIVE)),
         });
         self.brightness = outcome.estimate.brightness;
-        let correction = self.observe_velocity_error(frame, motion, &world_from_mid);
+        let correction = self.observe_path_error(frame, motion, &world_from_mid);
         if status == FrameStatus::Ok {
             self.typical.learn(outcome);
         }
@@ -448,12 +449,12 @@ impl<'m> Tracker<'m> {
 
     /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
     /// correction of the keyframe's velocity, per second in the keyframe, when it is time for one.
-    fn observe_velocity_error(
+    fn observe_path_error(
         &mut self,
         frame: &Frame,
         motion: &Motion,
         world_from_mid: &RigidTransform,
-    ) -> Option<Vector6<f64>> {
+    ) -> Option<PathRate> {
         let path_rate = motion.within_exposure.filter(|_| self.keyframe.timing.is_rolling())?;
         let dt = frame.timestamp - motion.timestamp;
         let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
@@ -462,31 +463,41 @@ impl<'m> Tracker<'m> {
         }
         let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
         let bend = next - motion.between_frames;
-        let floor = self.velocity_sigma(MID_POSE_SHEAR, self.span);
-        let sigma = Vector6::from_fn(|i, _| {
-            let group = if i < 3 { 0 } else { 3 };
-            0.3 * bend.fixed_rows::<3>(group).norm() + floor[i]
-        });
-        let mut difference = path_rate - slope;
-        let turn = self.keyframe.world_from_keyframe.rotation.inverse();
-        let shift = turn * nalgebra::Vector3::from(difference.fixed_rows::<3>(0));
-        difference.fixed_rows_mut::<3>(0).copy_from(&shift);
-        self.velocity_error.observe(&difference, &sigma)
+        let between = 0.5 * (dt + motion.interval);
+        let mut sigma = self.path_sigma(MID_POSE_SHEAR, self.span);
+        for i in 0..12 {
+            let bend = bend.fixed_rows::<3>(i / 3 % 2 * 3).norm();
+            sigma[i] += if i < 6 { 0.3 * bend } else { 0.3 * bend / between };
+        }
+        let keyframe_from_world = self.keyframe.world_from_keyframe.inverse();
+        let mut difference = PathRate::zeros();
+        let velocity = rotated(&keyframe_from_world, &(path_rate - slope));
+        let acceleration = rotated(&keyframe_from_world, &(motion.acceleration - bend / between));
+        difference.fixed_rows_mut::<6>(0).copy_from(&velocity);
+        difference.fixed_rows_mut::<6>(6).copy_from(&acceleration);
+        self.path_error.observe(&difference, &sigma)
     }
 
-    /// Standard deviations of a velocity, per second, that moves the picture by `pixels` within `span` seconds.
-    fn velocity_sigma(&self, pixels: f64, span: f64) -> Vector6<f64> {
-        let angle = pixels / self.config.camera.fx / span.max(1e-6);
+    /// Standard deviations of a velocity that moves the picture by `pixels` within `span` seconds, and of an acceleration
+    /// that moves it by as much at both ends of them.
+    fn path_sigma(&self, pixels: f64, span: f64) -> PathRate {
+        let span = span.max(1e-6);
+        let angle = pixels / self.config.camera.fx / span;
         let shift = angle / typical_inverse_depth(self.keyframe.finest_keypoints()).max(0.02);
-        Vector6::new(shift, shift, shift, angle, angle, angle)
+        PathRate::from_fn(|i, _| {
+            let of_velocity = if i / 3 % 2 == 0 { shift } else { angle };
+            if i < 6 { of_velocity } else { of_velocity * 8.0 / span }
+        })
     }
 
     /// Changes the keyframe's velocity by `correction` and shears picture and depth anew.
-    fn correct_keyframe_path(&mut self, correction: &Vector6<f64>) {
+    fn correct_keyframe_path(&mut self, correction: &PathRate) {
         let Some(old) = self.keyframe.keyframe_from_camera else { return };
-        let motion = old.linear.motion() + correction * self.keyframe_span;
+        let span = self.keyframe_span;
+        let motion = old.linear.motion() + correction.fixed_rows::<6>(0) * span;
+        let bow = old.bow + correction.fixed_rows::<6>(6) * (0.5 * span * span);
         let mid = RigidTransform::identity();
-        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), ..old };
+        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), bow };
         let depth_time = 0.5 + self.keyframe.timing.depth_time;
         let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
         self.keyframe.keyframe_from_camera = Some(path);
@@ -564,7 +575,7 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
         self.keyframe.timing = self.timing;
         self.keyframe_span = self.span;
-        self.velocity_error = VelocityError::unknown(&self.velocity_sigma(KEYFRAME_SHEAR, self.span));
+        self.path_error = PathError::unknown(&self.path_sigma(KEYFRAME_SHEAR, self.span));
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
         self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);

@@ -22,7 +22,7 @@ mod settings;
 pub use level::{Alignment, LevelOutcome, LevelPlan, StopReason};
 pub use objective::{AlignScratch, FrameData, ReferenceData};
 pub use placement::{MAX_BANDS, blur_length, place_sites};
-pub use prior::MotionPrior;
+pub use prior::{FollowsCentre, MotionPrior};
 pub use settings::AlignSettings;
 
 use nalgebra::{SVector, Vector6};

@@ -107,6 +107,21 @@ pub(super) struct Linearised {
     pub depth_compared: f64,
 }
 
+impl Linearised {
+    /// Adds a residual that grows with the second unknown and, `per_centre` times as fast, falls with the first.
+    fn add_tie(&mut self, [centre, unknown]: [usize; 2], per_centre: f64, information: f64, residual: f64) {
+        self.cost += 0.5 * information * residual * residual;
+        self.hessian[(unknown, unknown)] += information;
+        self.gradient[unknown] += information * residual;
+        if per_centre != 0.0 {
+            self.hessian[(centre, centre)] += per_centre * per_centre * information;
+            self.hessian[(centre, unknown)] -= per_centre * information;
+            self.hessian[(unknown, centre)] -= per_centre * information;
+            self.gradient[centre] -= per_centre * information * residual;
+        }
+    }
+}
+
 impl Objective<'_> {
     /// What one evaluation takes.
     pub(super) fn work(&self) -> Work {
@@ -283,23 +298,18 @@ impl Objective<'_> {
     }
 
     fn add_priors(&self, estimate: &Estimate, result: &mut Linearised) {
-        let residual = self.prior.residual(&estimate.keyframe_from_camera);
-        result.cost += self.prior.cost(&estimate.keyframe_from_camera);
+        let [motion, bow] = self.prior.residuals(&estimate.keyframe_from_camera, &estimate.bow);
+        let (of_motion, of_bow) =
+            self.prior.follows.map_or((0.0, 0.0), |follows| (follows.motion, follows.bow));
         for i in 0..6 {
-            result.hessian[(6 + i, 6 + i)] += self.prior.information[i];
-            result.gradient[6 + i] += self.prior.information[i] * residual[i];
+            result.add_tie([i, 6 + i], of_motion, self.prior.information[i], motion[i]);
         }
-        if self.frame.timing.reaches_outside() {
-            let residual = estimate.bow - self.prior.bow;
-            for (i, information) in self.prior.bow_information.iter().enumerate() {
-                result.cost += 0.5 * information * residual[i] * residual[i];
-                result.hessian[(UNKNOWNS + i, UNKNOWNS + i)] += information;
-                result.gradient[UNKNOWNS + i] += information * residual[i];
-            }
-        } else {
-            // Not an unknown: it stays where it is.
-            for i in UNKNOWNS..BOWED_UNKNOWNS {
-                result.hessian[(i, i)] = 1.0;
+        for i in 0..6 {
+            if self.frame.timing.reaches_outside() {
+                result.add_tie([i, UNKNOWNS + i], of_bow, self.prior.bow_information[i], bow[i]);
+            } else {
+                // Not an unknown: it stays where it is.
+                result.hessian[(UNKNOWNS + i, UNKNOWNS + i)] = 1.0;
             }
         }
         let brightness = [

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector6;
 
+use crate::geometry::RigidTransform;
 use crate::trajectory::ExposureTrajectory;
 
 /// A Gaussian belief about the motion during an exposure (translation in the keyframe in metres, rotation in
@@ -19,19 +20,34 @@ pub struct MotionPrior {
     pub bow: Vector6<f64>,
     /// Weight `1/variance` of each component of the bow.
     pub bow_information: Vector6<f64>,
+    /// How the belief follows the mid pose; `None` where it does not.
+    pub follows: Option<FollowsCentre>,
+}
+
+/// The belief about motion and bow comes from the way to the mid pose: if that moves, so does the belief.
+///
+/// Where rows and depth have other times than the middle, the mid pose is itself found by means of the motion, and a
+/// belief that stayed behind would hold both back.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FollowsCentre {
+    /// The mid pose for which the expected values hold.
+    pub keyframe_from_mid: RigidTransform,
+    /// Change of the expected motion per change of the mid pose.
+    pub motion: f64,
+    /// Change of the expected bow per change of the mid pose.
+    pub bow: f64,
 }
 
 impl MotionPrior {
-    /// Difference between the motion of `trajectory` and the expected one.
+    /// Differences between motion and bow of a path and the expected ones.
     #[must_use]
-    pub fn residual(&self, trajectory: &ExposureTrajectory) -> Vector6<f64> {
-        trajectory.motion() - self.expected
-    }
-
-    /// Half the weighted square of the residual.
-    #[must_use]
-    pub fn cost(&self, trajectory: &ExposureTrajectory) -> f64 {
-        let residual = self.residual(trajectory);
-        0.5 * residual.component_mul(&residual).dot(&self.information)
+    pub fn residuals(&self, trajectory: &ExposureTrajectory, bow: &Vector6<f64>) -> [Vector6<f64>; 2] {
+        let mut residuals = [trajectory.motion() - self.expected, bow - self.bow];
+        if let Some(follows) = &self.follows {
+            let centre = follows.keyframe_from_mid.tangent_to(&trajectory.mid());
+            residuals[0] -= centre * follows.motion;
+            residuals[1] -= centre * follows.bow;
+        }
+        residuals
     }
 }

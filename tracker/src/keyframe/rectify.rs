@@ -86,6 +86,16 @@ impl<'m> RectifyScratch<'m> {
         }
     }
 
+    /// Writes back a keyframe as it was captured.
+    pub fn restore(&self, image: &mut [f32], depth: &mut [f32]) {
+        if !self.image.is_empty() {
+            image.copy_from_slice(self.image);
+        }
+        if !self.depth.is_empty() {
+            depth.copy_from_slice(self.depth);
+        }
+    }
+
     /// Writes the remembered keyframe to `image` and `depth` as it would have been seen at the middle of its path
     /// `keyframe_from_camera`, whose middle is the identity. Where depth is missing, the picture moves like a surface at
     /// the mean depth. Returns the largest shift of the picture in pixels.

@@ -83,7 +83,13 @@ impl FrameTask<'_> {
         }
         guesses.push(self.motion.extrapolate(&steady, dt));
         match self.motion.within_exposure {
-            Some(rate) => guesses.push(self.motion.extrapolate(&rate, dt)),
+            Some(rate) => {
+                guesses.push(self.motion.extrapolate(&rate, dt));
+                if self.alignment.frame.timing.is_rolling() {
+                    let bent = rate + self.motion.acceleration * (0.5 * dt);
+                    guesses.push(self.motion.extrapolate(&bent, dt));
+                }
+            }
             None => guesses.extend(self.turns()),
         }
         guesses.push(self.motion.reference_from_mid);
@@ -156,7 +162,11 @@ impl FrameTask<'_> {
             max_iterations: self.alignment.settings.max_iterations,
             blur: self.blur,
         };
-        self.alignment.align_level(&plan, start, &self.prior(&start), scratch)
+        let mut prior = self.prior(&start);
+        if competing {
+            prior.follows = None;
+        }
+        self.alignment.align_level(&plan, start, &prior, scratch)
     }
 
     /// The estimate or its reverse, whichever moves in the expected direction: a blurred image alone cannot tell. Rows
@@ -179,13 +189,16 @@ impl FrameTask<'_> {
     }
 
     fn prior_at(&self, reference_from_mid: &RigidTransform) -> MotionPrior {
-        self.motion.expected_motion(
+        let prior = self.motion.expected_motion(
             reference_from_mid,
             self.timestamp,
             self.span,
             &self.alignment.camera,
             self.inverse_depth,
-        )
+        );
+        // Without rows or depth at other times the mid pose is measured by itself.
+        let follows = prior.follows.filter(|_| self.alignment.frame.timing.reaches_outside());
+        MotionPrior { follows, ..prior }
     }
 
     /// The estimate with the expected motion around a mid pose.

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector6;
 
-use crate::align::MotionPrior;
+use crate::align::{FollowsCentre, MotionPrior};
 use crate::geometry::{PinholeCamera, RigidTransform};
 
 /// The last tracked frame and how it was moving. Motions are (translation in the frame that the pose refers to,
@@ -30,6 +30,10 @@ const FLOOR_PIXELS: f64 = 0.5;
 
 /// The same for the bow, as a multiple: where a path of one unit ends, a quarter of the bow is seen.
 const BOW_FLOOR: f64 = 4.0;
+
+/// Accelerations of a violently shaken hand, m/s^2 and rad/s^2.
+const MAX_ACCELERATION: f64 = 100.0;
+const MAX_ANGULAR_ACCELERATION: f64 = 500.0;
 
 /// How far the motion within an exposure may correct the velocity that the mid poses around it give, as a share of the
 /// change of the mean velocity between them.
@@ -84,9 +88,12 @@ impl Motion {
         let dt = timestamp - self.timestamp;
         let mean_rate = self.reference_from_mid.tangent_to(reference_from_mid) / dt;
         let mut bow = Vector6::zeros();
+        let (mut motion_follows, mut bow_follows) = (span / dt, 0.0);
         let (rate, spread) = match self.within_exposure.filter(|_| dt <= MAX_GAP) {
             Some(measured) => {
-                let previous = self.previous_rate(&mean_rate, dt, &measured);
+                let (previous, share) = self.previous_rate(&mean_rate, dt, &measured);
+                motion_follows = (2.0 - share) * span / dt;
+                bow_follows = (1.0 - share) * (span / dt) * (span / dt);
                 let rate = mean_rate * 2.0 - previous;
                 let change = rate - previous;
                 bow = change * (0.5 * span * span / dt);
@@ -103,21 +110,41 @@ impl Motion {
                 1.0 / (sigma * sigma)
             })
         };
-        // A hand's acceleration changes by its own size within a frame.
-        let bow_spread = bow.abs() + rate.abs() * (0.1 * span);
+        // A hand's acceleration changes by its own size within a frame; no hand exceeds the limits, wherever a guess of the
+        // mid pose lies.
+        let mut bow_spread = bow.abs() + rate.abs() * (0.1 * span);
+        for (group, limit) in [(0, MAX_ACCELERATION), (3, MAX_ANGULAR_ACCELERATION)] {
+            let limit = 0.5 * limit * span * span;
+            for part in [&mut bow, &mut bow_spread] {
+                let length = part.fixed_rows::<3>(group).norm();
+                if length > limit {
+                    part.fixed_rows_mut::<3>(group).scale_mut(limit / length);
+                }
+            }
+        }
         MotionPrior {
             expected: rate * span,
             information: information(&(spread * span), 1.0),
             bow,
             bow_information: information(&bow_spread, BOW_FLOOR),
+            follows: (dt <= MAX_GAP).then_some(FollowsCentre {
+                keyframe_from_mid: *reference_from_mid,
+                motion: motion_follows,
+                bow: bow_follows,
+            }),
         }
     }
 
     /// Velocity at the last frame, given the mean rate from it to the next, `dt` seconds later, and what its own exposure
-    /// says.
-    fn previous_rate(&self, mean_rate: &Vector6<f64>, dt: f64, measured: &Vector6<f64>) -> Vector6<f64> {
+    /// says; and the share of a change of the mean rate that it takes on.
+    fn previous_rate(
+        &self,
+        mean_rate: &Vector6<f64>,
+        dt: f64,
+        measured: &Vector6<f64>,
+    ) -> (Vector6<f64>, f64) {
         if self.interval > MAX_GAP {
-            return *measured;
+            return (*measured, 0.0);
         }
         // The slope at the middle of three points: the nearer side counts more.
         let slope = (mean_rate * self.interval + self.between_frames * dt) / (dt + self.interval);
@@ -130,7 +157,7 @@ impl Motion {
                 correction.fixed_rows_mut::<3>(group).scale_mut(limit / length);
             }
         }
-        slope + correction
+        (slope + correction, self.interval / (dt + self.interval))
     }
 }
 

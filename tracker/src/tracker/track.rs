@@ -44,7 +44,7 @@ const KEYFRAME_SHEAR: f64 = 2.0;
 const MID_POSE_SHEAR: f64 = 0.3;
 
 /// Alignments of the second frame with a first one whose own shear becomes known by them.
-const BOOTSTRAP_ROUNDS: usize = 3;
+const BOOTSTRAP_ROUNDS: usize = 2;
 
 /// The linear motion during the exposure of the middle row.
 fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajectory {
@@ -271,23 +271,14 @@ impl<'m> Tracker<'m> {
         }
         let dt = frame.timestamp - motion.timestamp;
         let mid = first.outcome.estimate.keyframe_from_camera.mid();
-        let mut rate = RigidTransform::identity().tangent_to(&mid) / dt;
-        self.set_keyframe_path(&rate, &Vector6::zeros());
+        let rate = RigidTransform::identity().tangent_to(&mid) / dt;
+        self.set_keyframe_path(self.path_of_keyframe(&rate, &Vector6::zeros()));
         let mut second = self.align(frame, motion, self.config.align.blur, Some(mid));
-        let mut refined = self.rate_before(&second.outcome.estimate, dt);
+        let refined = self.rate_before(&second.outcome.estimate, dt);
+        let mut path = self.path_of_keyframe(&refined, &Vector6::zeros());
         if timing.reaches_outside() {
-            // The shear of the reference follows from its own velocity: align with the reference as it now is.
-            for _ in 0..BOOTSTRAP_ROUNDS {
-                rate = refined;
-                let within = second.outcome.estimate.keyframe_from_camera.motion() / self.span;
-                self.set_keyframe_path(&rate, &((within - rate) / dt));
-                let mid = second.outcome.estimate.keyframe_from_camera.mid();
-                second = self.align(frame, motion, self.config.align.blur, Some(mid));
-                refined = self.rate_before(&second.outcome.estimate, dt);
-            }
-        }
-        let path = self.path_of_keyframe(&refined, &Vector6::zeros());
-        if !timing.reaches_outside() {
+            (second, path) = self.align_each_other(frame, motion, second);
+        } else {
             self.keyframe.keyframe_from_camera = Some(path);
         }
         let exposure = exposure_of(&path, &self.keyframe.timing);
@@ -314,8 +305,54 @@ impl<'m> Tracker<'m> {
         BowedTrajectory { linear, bow: acceleration * (0.5 * span * span) }
     }
 
-    fn set_keyframe_path(&mut self, rate: &Vector6<f64>, acceleration: &Vector6<f64>) {
-        let path = self.path_of_keyframe(rate, acceleration);
+    /// Aligns the frame with the keyframe and the keyframe with the frame in turn, until each has been given one time with
+    /// a path that was measured against the other. Returns the alignment of the frame and the keyframe's path.
+    fn align_each_other(
+        &mut self,
+        frame: &Frame,
+        motion: &Motion,
+        first: Aligned,
+    ) -> (Aligned, BowedTrajectory) {
+        let mut of_frame = first;
+        let mut of_keyframe =
+            BowedTrajectory::without_bow(ExposureTrajectory::still(RigidTransform::identity()));
+        for _ in 0..BOOTSTRAP_ROUNDS {
+            let keyframe_from_mid = of_frame.outcome.estimate.keyframe_from_camera.mid();
+            let mid_from_keyframe = keyframe_from_mid.inverse();
+            self.exchange_with_keyframe(of_frame.outcome.estimate.path().seen_from(&mid_from_keyframe));
+            let back = Frame { timestamp: motion.timestamp, ..*frame };
+            let from_frame = Motion::still(frame.timestamp, RigidTransform::identity());
+            let world_from_frame = self.keyframe.world_from_keyframe.compose(&keyframe_from_mid);
+            let world_from_keyframe =
+                core::mem::replace(&mut self.keyframe.world_from_keyframe, world_from_frame);
+            let from_frame = from_frame.seen_from(&world_from_frame);
+            let reverse = self.align(&back, &from_frame, self.config.align.blur, Some(mid_from_keyframe));
+            let frame_from_keyframe = reverse.outcome.estimate.path();
+            of_keyframe = frame_from_keyframe.seen_from(&frame_from_keyframe.linear.mid().inverse());
+            self.keyframe.world_from_keyframe = world_from_keyframe;
+            self.exchange_with_keyframe(of_keyframe);
+            let start = frame_from_keyframe.linear.mid().inverse();
+            of_frame = self.align(frame, motion, self.config.align.blur, Some(start));
+        }
+        (of_frame, of_keyframe)
+    }
+
+    /// Makes the current frame, which moved along `path` seen from its own mid pose, the keyframe, and the keyframe as it
+    /// was captured the current frame.
+    fn exchange_with_keyframe(&mut self, path: BowedTrajectory) {
+        let keyframe = &mut self.keyframe;
+        self.rectify.restore(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
+        keyframe.pyramid.reduce();
+        mem::swap(&mut self.pyramid, &mut keyframe.pyramid);
+        mem::swap(&mut self.depth, &mut keyframe.depth);
+        mem::swap(&mut self.timing, &mut keyframe.timing);
+        mem::swap(&mut self.span, &mut self.keyframe_span);
+        self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
+        keyframe.restart_surface();
+        self.set_keyframe_path(path);
+    }
+
+    fn set_keyframe_path(&mut self, path: BowedTrajectory) {
         self.keyframe.keyframe_from_camera = Some(path);
         self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
         self.sharpen_keyframe();

@@ -164,6 +164,7 @@ impl FrameTask<'_> {
         };
         let mut prior = self.prior(&start);
         if competing {
+            // A guess far from the truth must be able to leave the motion that follows from it.
             prior.follows = None;
         }
         self.alignment.align_level(&plan, start, &prior, scratch)
@@ -218,7 +219,7 @@ impl FrameTask<'_> {
 
 /// How badly a guess ended, where the reference has `keypoints` on the level: photometric residual, raised by patches
 /// that disagree or left the view and by depth that does not fit.
-fn score(outcome: &LevelOutcome, keypoints: usize) -> f64 {
+pub(super) fn score(outcome: &LevelOutcome, keypoints: usize) -> f64 {
     let agreeing = outcome.patches as f64 / keypoints.max(1) as f64;
     let depth = 1.0 + 100.0 * f64::from(outcome.depth_scale);
     if agreeing < MIN_AGREEING { f64::MAX } else { f64::from(outcome.photometric_scale) * depth / agreeing }

@@ -97,7 +97,7 @@ impl Motion {
                 let rate = mean_rate * 2.0 - previous;
                 let change = rate - previous;
                 bow = change * (0.5 * span * span / dt);
-                (rate, change.abs() * 0.2 + rate.abs() * 0.1)
+                (rate, change.abs() * 0.3 + rate.abs() * 0.15)
             }
             None => (mean_rate, mean_rate.abs() * 0.6),
         };

@@ -61,6 +61,11 @@ pub(super) fn judge(outcome: &LevelOutcome, evidence: &Evidence, typical: &Typic
     if residual > 2.5 || evidence.inliers < 0.2 { FrameStatus::Weak } else { FrameStatus::Ok }
 }
 
+/// Whether an alignment fits so much worse than usual that another try from other guesses is worth its time.
+pub(super) fn fits_badly(outcome: &LevelOutcome, typical: &Typical) -> bool {
+    ratio(outcome.photometric_scale, typical.residual) > 2.0
+}
+
 fn ratio(value: f32, typical: f32) -> f32 {
     if typical > 0.0 { value / typical } else { 1.0 }
 }
@@ -74,7 +79,7 @@ pub(super) fn wants_keyframe(evidence: &Evidence, keyframe_blur: f32, image_widt
     let usable = evidence.depth_share > 0.15;
     let much_sharper = evidence.blur + 1.0 < 0.6 * keyframe_blur;
     let far = evidence.overlap < 0.6 || evidence.flow > 0.2 * width;
-    let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(0.006 * width);
+    let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(0.012 * width);
     let leaving = evidence.overlap < 0.45 || evidence.flow > 0.3 * width;
     usable && (much_sharper || (far && as_sharp) || leaving)
 }

@@ -5,12 +5,12 @@ use core::mem;
 use fearless_simd::Level;
 use nalgebra::Vector6;
 
-use super::coarse_to_fine::{Aligned, FrameTask};
+use super::coarse_to_fine::{Aligned, FrameTask, score};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::Frame;
 use super::history::{Motion, rotated};
 use super::keyframe_path::{PathError, PathRate};
-use super::policy::{Evidence, Typical, judge, wants_keyframe};
+use super::policy::{Evidence, Typical, fits_badly, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
 use super::result::{FrameResult, FrameStatus, Revision};
 use crate::align::{AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, ReferenceData, blur_length};
@@ -222,6 +222,15 @@ impl<'m> Tracker<'m> {
             (aligned, revision) = self.bootstrap(frame, motion);
         } else {
             aligned = self.align(frame, motion, self.config.align.blur, None);
+            if fits_badly(&aligned.outcome, &self.typical) {
+                // As if nothing were known about the motion: all directions are tried.
+                let anywhere = Motion { within_exposure: None, ..*motion };
+                let other = self.align(frame, &anywhere, self.config.align.blur, None);
+                let keypoints = self.keyframe.finest_keypoints().len();
+                if score(&other.outcome, keypoints) < score(&aligned.outcome, keypoints) {
+                    aligned = other;
+                }
+            }
         }
         let mut status = self.judge(&aligned.outcome, motion, frame);
         if status == FrameStatus::Lost && self.recover(frame, motion) {

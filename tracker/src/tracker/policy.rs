@@ -73,13 +73,19 @@ fn ratio(value: f32, typical: f32) -> f32 {
 /// Whether the frame should replace a keyframe that was blurred by `keyframe_blur` pixels.
 ///
 /// A keyframe is chosen for being sharp, not only for distance: a frame that is much sharper is taken at once, one
-/// that is far is taken if it is not blurred more, and only when the view is about to be lost is any frame taken.
-pub(super) fn wants_keyframe(evidence: &Evidence, keyframe_blur: f32, image_width: usize) -> bool {
+/// that is far is taken if it is not blurred more, and only when the view is about to be lost is any frame taken. Where
+/// `rolling` rows make the velocity an unknown that only overlap can tell, a new view is worth more blur.
+pub(super) fn wants_keyframe(
+    evidence: &Evidence,
+    keyframe_blur: f32,
+    image_width: usize,
+    rolling: bool,
+) -> bool {
     let width = image_width as f32;
     let usable = evidence.depth_share > 0.15;
     let much_sharper = evidence.blur + 1.0 < 0.6 * keyframe_blur;
     let far = evidence.overlap < 0.6 || evidence.flow > 0.2 * width;
-    let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(0.012 * width);
+    let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(if rolling { 0.012 } else { 0.006 } * width);
     let leaving = evidence.overlap < 0.45 || evidence.flow > 0.3 * width;
     usable && (much_sharper || (far && as_sharp) || leaving)
 }

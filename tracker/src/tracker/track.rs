@@ -474,7 +474,8 @@ impl<'m> Tracker<'m> {
         if status == FrameStatus::Ok {
             self.typical.learn(outcome);
         }
-        let wanted = wants_keyframe(&evidence, self.keyframe.blur, self.config.camera.width);
+        let wanted =
+            wants_keyframe(&evidence, self.keyframe.blur, self.config.camera.width, self.timing.is_rolling());
         if status == FrameStatus::Ok && wanted {
             self.keep_keyframe();
             let path = world_path.seen_from(&world_from_mid.inverse());

@@ -54,7 +54,8 @@ pub(super) fn radiance(scene: &Scene, size: Size, sub_frames: &[SubFrame]) -> Ve
         let mut visible = Vec::new();
         for left in (0..size.width).step_by(TILE) {
             for sub_frame in sub_frames {
-                add_tile(scene, sub_frame, [left, band * TILE], size.width, pixels, &mut visible);
+                let block = Block { left, top: band * TILE, width: TILE, height: TILE };
+                add_block(scene, sub_frame, &block, size.width, pixels, &mut visible);
             }
         }
         let share = 1.0 / sub_frames.len() as f32;
@@ -63,21 +64,56 @@ pub(super) fn radiance(scene: &Scene, size: Size, sub_frames: &[SubFrame]) -> Ve
     image
 }
 
-/// Adds one sub-frame to the tile at column and row `corner`; `band` is the tile's rows over the whole width.
-fn add_tile(
+/// Pixels of a row for which visible things are looked up together.
+const STRETCH: usize = 64;
+
+/// Mean linear RGB radiance when each row is exposed at its own time: `view_at(row, k)` is the view of its k-th
+/// sub-frame, and there are as many of those as sampling positions within a pixel.
+pub(super) fn rolling_radiance(
+    scene: &Scene,
+    size: Size,
+    offsets: &[[f32; 2]],
+    view_at: impl Fn(usize, usize) -> View + Sync,
+) -> Vec<Vec3> {
+    let mut image = vec![Vec3::ZERO; size.width * size.height];
+    image.par_chunks_mut(size.width).enumerate().for_each(|(row, pixels)| {
+        let mut visible = Vec::new();
+        for (k, offset) in offsets.iter().enumerate() {
+            let sub_frame = SubFrame { view: view_at(row, k), offset: *offset };
+            for left in (0..size.width).step_by(STRETCH) {
+                let block = Block { left, top: row, width: STRETCH, height: 1 };
+                add_block(scene, &sub_frame, &block, size.width, pixels, &mut visible);
+            }
+        }
+        let share = 1.0 / offsets.len() as f32;
+        pixels.iter_mut().for_each(|pixel| *pixel *= share);
+    });
+    image
+}
+
+/// Pixels next to each other; the image may end before they do.
+struct Block {
+    left: usize,
+    top: usize,
+    width: usize,
+    height: usize,
+}
+
+/// Adds one sub-frame to the block; `band` is its rows over the whole `width` of the image.
+fn add_block(
     scene: &Scene,
     sub_frame: &SubFrame,
-    corner: [usize; 2],
+    block: &Block,
     width: usize,
     band: &mut [Vec3],
     visible: &mut Vec<u16>,
 ) {
     let SubFrame { view, offset } = sub_frame;
-    let right = width.min(corner[0] + TILE);
-    cull_tile(scene, view, corner, visible);
+    let right = width.min(block.left + block.width);
+    cull_block(scene, view, block, visible);
     for (row, pixels) in band.chunks_mut(width).enumerate() {
-        let v = (corner[1] + row) as f32 + offset[1];
-        for (column, pixel) in (corner[0]..right).zip(&mut pixels[corner[0]..right]) {
+        let v = (block.top + row) as f32 + offset[1];
+        for (column, pixel) in (block.left..right).zip(&mut pixels[block.left..right]) {
             let ray = view.ray(column as f32 + offset[0], v);
             let hit = scene.hit(&ray, visible);
             *pixel += scene.radiance(&ray, &hit, view.pixel_angle);
@@ -85,8 +121,10 @@ fn add_tile(
     }
 }
 
-fn cull_tile(scene: &Scene, view: &View, corner: [usize; 2], visible: &mut Vec<u16>) {
-    let [columns, rows] = corner.map(|first| [first as f32 - 1.0, (first + TILE) as f32]);
+/// Looks up what rays within a pixel of the block may meet.
+fn cull_block(scene: &Scene, view: &View, block: &Block, visible: &mut Vec<u16>) {
+    let range = |first: usize, count: usize| [first as f32 - 1.0, (first + count) as f32];
+    let (columns, rows) = (range(block.left, block.width), range(block.top, block.height));
     scene.cull(&view.cone(columns, rows), visible);
 }
 
@@ -105,7 +143,8 @@ pub(super) fn depth(scene: &Scene, size: Size, view: &View) -> Vec<DepthSample> 
     samples.par_chunks_mut(size.width * TILE).enumerate().for_each(|(band, samples)| {
         let mut visible = Vec::new();
         for left in (0..size.width).step_by(TILE) {
-            cull_tile(scene, view, [left, band * TILE], &mut visible);
+            let block = Block { left, top: band * TILE, width: TILE, height: TILE };
+            cull_block(scene, view, &block, &mut visible);
             let right = size.width.min(left + TILE);
             for (row, samples) in samples.chunks_mut(size.width).enumerate() {
                 for (column, sample) in (left..right).zip(&mut samples[left..right]) {

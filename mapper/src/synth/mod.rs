@@ -34,6 +34,8 @@ mod random;
 mod render;
 mod round;
 mod scene;
+#[cfg(test)]
+mod sensor_tests;
 mod sequence;
 #[cfg(test)]
 mod sequence_tests;

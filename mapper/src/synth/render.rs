@@ -161,3 +161,40 @@ fn depth_sample(scene: &Scene, ray: &Ray, hit: &Hit) -> DepthSample {
     let cosine = ray.direction.dot(scene.normal(ray, hit)) / ray.direction.length();
     DepthSample { depth: hit.distance, incidence: cosine.abs() }
 }
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+    use nalgebra::{UnitQuaternion, Vector3};
+
+    use super::super::{CameraMotion, SceneName};
+    use super::*;
+
+    #[test]
+    fn rows_that_are_exposed_together_make_the_image_of_a_global_shutter() {
+        // Neither side is a whole number of tiles or stretches.
+        let size = Size { width: 150, height: 41 };
+        let camera = PinholeCamera { width: 150, height: 41, fx: 90.0, fy: 90.0, cx: 74.5, cy: 20.0 };
+        let scene = Scene::new(SceneName::Room, CameraMotion::Sweep);
+        let start = RigidTransform::new(UnitQuaternion::identity(), scene.sweep.centre);
+        let view = |k: usize| {
+            let shift = Vector3::new(0.02, -0.01, 0.03) * k as f64;
+            View::new(&camera, &RigidTransform { translation: start.translation + shift, ..start })
+        };
+        let offsets = jitter(5);
+        let sub_frames: Vec<_> = offsets
+            .iter()
+            .enumerate()
+            .map(|(k, offset)| SubFrame { view: view(k), offset: *offset })
+            .collect();
+        let global = radiance(&scene, size, &sub_frames);
+        assert_eq!(rolling_radiance(&scene, size, &offsets, |_, k| view(k)), global);
+        // A view of its own for each row: row 30 is that of the image with this view.
+        let rows = rolling_radiance(&scene, size, &offsets, |row, k| view(k + row % 7));
+        let shifted: Vec<_> =
+            sub_frames.iter().enumerate().map(|(k, sub)| SubFrame { view: view(k + 2), ..*sub }).collect();
+        let row = 30 * 150..31 * 150;
+        assert_eq!(rows[row.clone()], radiance(&scene, size, &shifted)[row.clone()]);
+        assert_ne!(rows[row.clone()], global[row]);
+    }
+}

@@ -51,6 +51,9 @@ pub struct Mapping {
     /// Model of the motion during the exposure
     #[arg(long, value_enum, default_value_t)]
     pub blur: BlurMode,
+    /// Let no frame say anything about its neighbours: no repair of reversed, misplaced or lost frames, no prior of motion
+    #[arg(long)]
+    pub no_continuity: bool,
     /// At most this many virtual views per exposure
     #[arg(long, value_name = "N")]
     pub virtual_views: Option<NonZeroUsize>,
@@ -92,6 +95,7 @@ impl From<&Mapping> for MapSettings {
         Self {
             kind: args.field.into(),
             blur: args.blur == BlurMode::Auto,
+            continuity: !args.no_continuity,
             virtual_views: args.virtual_views.map(NonZeroUsize::get),
             max_keyframes: args.max_keyframes.get(),
             max_gaussians: args.max_gaussians.map(NonZeroUsize::get),
@@ -108,6 +112,7 @@ impl Default for Mapping {
             field: Field::default(),
             time_budget: None,
             blur: BlurMode::default(),
+            no_continuity: false,
             virtual_views: None,
             max_keyframes: default_keyframes(),
             max_gaussians: None,

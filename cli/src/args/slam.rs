@@ -95,6 +95,10 @@ pub struct Ablation {
     /// Correct the drift when a place is seen again
     #[arg(long = "loop", value_enum, default_value_t)]
     pub loops: Switch,
+    /// Let no frame say anything about its neighbours in the refinement: no repair of reversed, misplaced or lost frames,
+    /// no prior of motion
+    #[arg(long)]
+    pub no_continuity: bool,
 }
 
 /// Values of `--reference`.
@@ -111,7 +115,7 @@ pub enum MapReference {
 
 impl From<&Slamming> for SlamSettings {
     fn from(args: &Slamming) -> Self {
-        let Ablation { blur, virtual_views, reference, depth_term, loops } = args.ablation;
+        let Ablation { blur, virtual_views, reference, depth_term, loops, no_continuity } = args.ablation;
         Self {
             kind: args.field.into(),
             blur: blur == BlurMode::Auto,
@@ -123,6 +127,7 @@ impl From<&Slamming> for SlamSettings {
             },
             depth_term: depth_term == Switch::On,
             loops: loops == Switch::On,
+            continuity: !no_continuity,
             max_keyframes: args.max_keyframes.get(),
             max_gaussians: args.max_gaussians.map(NonZeroUsize::get),
             time_budget: args.time_budget,

@@ -48,7 +48,7 @@ pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
 }
 
 /// What is left out or replaced, by the name of its row.
-fn variants() -> [(&'static str, Ablation); 7] {
+fn variants() -> [(&'static str, Ablation); 8] {
     let all = Ablation::default();
     [
         ("everything", all),
@@ -58,6 +58,7 @@ fn variants() -> [(&'static str, Ablation); 7] {
         ("reference deblurred", Ablation { reference: MapReference::Deblurred, ..all }),
         ("depth term off", Ablation { depth_term: Switch::Off, ..all }),
         ("loop off", Ablation { loops: Switch::Off, ..all }),
+        ("continuity off", Ablation { no_continuity: true, ..all }),
     ]
 }
 

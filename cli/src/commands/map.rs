@@ -59,6 +59,7 @@ fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
         "field": name(&args.field),
         "trajectory": absolute(&run.folder),
         "blur": name(&args.blur),
+        "continuity": if args.no_continuity { "off" } else { "on" },
         "virtual_views": or_auto(args.virtual_views),
         "max_keyframes": args.max_keyframes,
         "max_gaussians": or_auto(args.max_gaussians),

@@ -68,6 +68,7 @@ fn describe(dataset: &Dataset, args: &Slamming) -> RunSettings {
         "reference": name(&args.ablation.reference),
         "depth_term": on_off(settings.depth_term),
         "loop": on_off(settings.loops),
+        "continuity": on_off(settings.continuity),
         "max_keyframes": settings.max_keyframes,
         "max_gaussians": or_auto(settings.max_gaussians),
         "time_budget_seconds": settings.time_budget.map(|budget| budget.as_secs_f64()),

@@ -13,20 +13,25 @@ use super::spline::Part;
 /// Cost at which a pair says nothing more: one of the two was aligned to the wrong place.
 const HIGHEST_PAIR_COST: f64 = 60.0;
 
+/// Energy of a pair whose six numbers are as usual.
+pub(super) const USUAL_ENERGY: f64 = 3.0;
+
 /// Which of `measured` run against time as measured. A swap has to lower the cost by `evidence`.
 pub(super) fn reversed_exposures(measured: &[Measured], evidence: f64) -> Vec<bool> {
     let samples: Vec<Sample> = measured.iter().map(Measured::sample).collect();
     let accelerations = Part::BOTH.map(|part| typical_derivatives(&samples, part, 2));
+    let prior_of_swap = |frame: &Measured| if frame.held.direction { f64::INFINITY } else { evidence };
     // Per direction of a frame: the lowest cost of all frames up to it, and the direction of the one before.
-    let mut costs = vec![[0.0, evidence]];
+    let mut costs = vec![[0.0, measured.first().map_or(evidence, prior_of_swap)]];
     let mut before = vec![[false; 2]];
     for (k, pair) in measured.windows(2).enumerate() {
         let usual = [0, 1].map(|part| accelerations[part][k].max(accelerations[part][k + 1]));
         let [forward, backward] = costs[k];
+        let of_pair = pair_costs(pair, usual);
         let step = [false, true].map(|direction| {
-            let from_forward = forward + pair_cost(pair, [false, direction], usual);
-            let from_backward = backward + pair_cost(pair, [true, direction], usual);
-            let prior = if direction { evidence } else { 0.0 };
+            let [after_forward, after_backward] = of_pair[usize::from(direction)];
+            let (from_forward, from_backward) = (forward + after_forward, backward + after_backward);
+            let prior = if direction { prior_of_swap(&pair[1]) } else { 0.0 };
             (from_forward.min(from_backward) + prior, from_backward < from_forward)
         });
         costs.push(step.map(|(cost, _)| cost));
@@ -45,8 +50,19 @@ fn trace_back(costs: &[[f64; 2]], before: &[[bool; 2]]) -> Vec<bool> {
     reversed
 }
 
+/// Costs of a pair by the directions of its second and its first frame. Where even the best pair of directions needs an
+/// unusual motion, as after a jerk of the hand, the motion was that unusual, and only what exceeds it tells directions
+/// apart.
+fn pair_costs(pair: &[Measured], usual_accelerations: [f64; 2]) -> [[f64; 2]; 2] {
+    let energies = [false, true]
+        .map(|second| [false, true].map(|first| pair_energy(pair, [first, second], usual_accelerations)));
+    let least = energies.as_flattened().iter().copied().fold(f64::INFINITY, f64::min);
+    let unusual = (least / USUAL_ENERGY).max(1.0);
+    energies.map(|second| second.map(|energy| (energy / unusual).min(HIGHEST_PAIR_COST)))
+}
+
 /// Energy of the gentlest motion between two exposures, in units of what is usual.
-fn pair_cost(pair: &[Measured], reversed: [bool; 2], usual_accelerations: [f64; 2]) -> f64 {
+fn pair_energy(pair: &[Measured], reversed: [bool; 2], usual_accelerations: [f64; 2]) -> f64 {
     let [a, b] = [&pair[0], &pair[1]];
     let seconds = b.timestamp - a.timestamp;
     let cost = |part: Part, acceleration: f64| {
@@ -62,5 +78,5 @@ fn pair_cost(pair: &[Measured], reversed: [bool; 2], usual_accelerations: [f64; 
     };
     let [translation, rotation] = usual_accelerations;
     let cost = cost(Part::Translation, translation) + cost(Part::Rotation, rotation);
-    (0.5 * cost).min(HIGHEST_PAIR_COST)
+    0.5 * cost
 }

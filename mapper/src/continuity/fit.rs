@@ -8,6 +8,7 @@ use mba_tracker::trajectory::ExposureTrajectory;
 use nalgebra::Vector3;
 
 use super::ContinuitySettings;
+use super::direction::USUAL_ENERGY;
 use super::frame::PoseNoise;
 use super::problem::{Observation, Problem};
 use super::scales::{Sample, typical_derivatives};
@@ -36,6 +37,16 @@ pub(super) struct Measured {
     pub(super) shutter: [f64; 2],
     pub(super) exposure: ExposureTrajectory,
     pub(super) noise: PoseNoise,
+    pub(super) held: Held,
+}
+
+/// What other evidence than continuity has settled about a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Held {
+    /// It is where it was measured.
+    pub(super) place: bool,
+    /// It runs as it was measured.
+    pub(super) direction: bool,
 }
 
 impl Measured {
@@ -210,7 +221,13 @@ impl<'a> State<'a> {
         };
         let wrong = |(frame, here): (&Measured, &Judgement)| {
             let other = Judgement { reversed: !here.reversed, ..*here };
-            !here.outlier && cost(frame, *here) - cost(frame, other) > self.settings.swap_evidence
+            if here.outlier || frame.held.direction {
+                return false;
+            }
+            // A path that fits neither direction tells them apart by what exceeds its misfit.
+            let (cost_here, cost_there) = (cost(frame, *here), cost(frame, other));
+            let unusual = (cost_there / USUAL_ENERGY).max(1.0);
+            (cost_here - cost_there) / unusual > self.settings.swap_evidence
         };
         let wrong: Vec<bool> = self.measured.iter().zip(&self.judgements).map(wrong).collect();
         for (judgement, &wrong) in self.judgements.iter_mut().zip(&wrong) {

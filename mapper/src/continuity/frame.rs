@@ -57,6 +57,8 @@ pub struct ContinuityFrame {
     pub world_from_camera: ExposureTrajectory,
     /// Noise of the measured ends; `None` for a lost frame, whose poses measure nothing.
     pub noise: Option<PoseNoise>,
+    /// Whether the tracker found nothing odd about the frame: then what it shows has to speak clearly for another pose.
+    pub trusted: bool,
 }
 
 impl ContinuityFrame {

@@ -8,14 +8,19 @@
 //! positions and velocities around each frame tell which ones are misplaced: a path so flexible could follow them as it
 //! has to follow a jolt of the hand.
 //!
+//! Smoothness is a prior, not a judge: a hand can jerk. A frame that looks misplaced is compared with others at both of
+//! its poses ([`compare_exposures`]), and stays where it was measured unless what it shows speaks for the other pose.
+//!
 //! [`repair`] corrects swaps, outliers and lost frames and leaves every other frame as it was measured, bit for bit.
 //! [`repair_run`] is the same for the data of a RUN folder. [`predict_motions`] gives bundle adjustment the motion during
 //! an exposure that the neighbours of a frame suggest.
 
 mod direction;
 mod error;
+mod evidence;
 mod fit;
 mod frame;
+mod picture;
 mod prediction;
 mod problem;
 mod repair;
@@ -26,8 +31,10 @@ mod settings;
 mod spline;
 
 pub use error::ContinuityError;
+pub use evidence::{Evidence, Mismatch, Suspicion};
 pub use frame::{ContinuityFrame, PoseNoise};
+pub use picture::{FramePicture, compare_exposures};
 pub use prediction::{MotionPrediction, predict_motions};
-pub use repair::{Continuity, ContinuityEnergy, FrameVerdict, repair};
+pub use repair::{Continuity, ContinuityEnergy, FrameVerdict, repair, repair_by_evidence};
 pub use run_data::{RepairedRun, repair_run, run_frames};
 pub use settings::{ContinuitySettings, MotionLimits};

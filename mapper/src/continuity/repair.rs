@@ -3,11 +3,15 @@
 use std::ops::Range;
 
 use mba_tracker::trajectory::ExposureTrajectory;
+use rayon::prelude::*;
 
-use super::fit::{FEWEST_FRAMES, Fit, Measured, fit};
+use super::fit::{FEWEST_FRAMES, Fit, Held, Measured, fit};
 use super::frame::validate;
-use super::{ContinuityError, ContinuityFrame, ContinuitySettings};
+use super::{ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, Suspicion};
 use crate::evaluation::quantile;
+
+/// Frames to either side that a suspected one is compared with.
+const REFERENCES_PER_SIDE: usize = 2;
 
 /// What became of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,6 +82,44 @@ pub fn repair(
 ) -> Result<Continuity, ContinuityError> {
     settings.validate()?;
     validate(frames)?;
+    repair_others(frames, &vec![Held::default(); frames.len()], settings)
+}
+
+/// [`repair`] where what the frames show has the last word: a measured exposure that explains its frame as well as the
+/// suggested one stays, and the others are judged again with it in its place. Where `evidence` says nothing, continuity
+/// decides.
+///
+/// # Errors
+/// As [`repair`].
+pub fn repair_by_evidence(
+    frames: &[ContinuityFrame],
+    settings: &ContinuitySettings,
+    evidence: &Evidence<'_>,
+) -> Result<Continuity, ContinuityError> {
+    settings.validate()?;
+    validate(frames)?;
+    let mut held = vec![Held::default(); frames.len()];
+    loop {
+        let result = repair_others(frames, &held, settings)?;
+        let suspects: Vec<usize> = (0..frames.len()).filter(|&k| result.contradicts_measurement(k)).collect();
+        let found = suspects.par_iter().map(|&k| (k, result.held_by(frames, k, evidence)));
+        let found: Vec<(usize, Held)> = found.filter(|(_, held)| *held != Held::default()).collect();
+        if found.is_empty() {
+            return Ok(result);
+        }
+        for (k, more) in found {
+            held[k].place |= more.place;
+            held[k].direction |= more.direction;
+        }
+    }
+}
+
+/// Repairs all frames but those that are held.
+fn repair_others(
+    frames: &[ContinuityFrame],
+    held: &[Held],
+    settings: &ContinuitySettings,
+) -> Result<Continuity, ContinuityError> {
     let unjudged = |frame: &ContinuityFrame| match frame.noise {
         Some(_) => FrameVerdict::Kept,
         None => FrameVerdict::Unresolved,
@@ -89,7 +131,8 @@ pub fn repair(
     };
     let Some(interval) = usual_interval(frames) else { return Ok(result) };
     for piece in pieces(frames, settings.longest_gap * interval) {
-        let measured: Vec<Measured> = frames[piece.clone()].iter().filter_map(measured).collect();
+        let pairs = frames[piece.clone()].iter().zip(&held[piece.clone()]);
+        let measured: Vec<Measured> = pairs.filter_map(|(frame, held)| measured(frame, *held)).collect();
         if measured.len() < FEWEST_FRAMES {
             continue;
         }
@@ -104,6 +147,38 @@ pub fn repair(
 }
 
 impl Continuity {
+    fn contradicts_measurement(&self, k: usize) -> bool {
+        matches!(self.verdicts[k], FrameVerdict::Replaced | FrameVerdict::Reversed)
+    }
+
+    /// What the evidence holds of frame `k` against its verdict.
+    fn held_by(&self, frames: &[ContinuityFrame], k: usize, evidence: &Evidence<'_>) -> Held {
+        let references = self.references(frames, k);
+        let suspicion = Suspicion {
+            frame: k,
+            measured: &frames[k].world_from_camera,
+            suggested: &self.exposures[k],
+            references: &references,
+        };
+        let Some(mismatch) = evidence(&suspicion) else { return Held::default() };
+        match self.verdicts[k] {
+            FrameVerdict::Replaced => {
+                Held { place: mismatch.holds_place(frames[k].trusted), direction: false }
+            }
+            _ => Held { place: false, direction: mismatch.holds_direction() },
+        }
+    }
+
+    /// The nearest frames to either side of `k` that stay in their place, nearest first.
+    fn references(&self, frames: &[ContinuityFrame], k: usize) -> Vec<(usize, ExposureTrajectory)> {
+        let in_place = |l: &usize| matches!(self.verdicts[*l], FrameVerdict::Kept | FrameVerdict::Reversed);
+        let before = (0..k).rev().filter(in_place).take(REFERENCES_PER_SIDE);
+        let after = (k + 1..frames.len()).filter(in_place).take(REFERENCES_PER_SIDE);
+        let mut references: Vec<usize> = before.chain(after).collect();
+        references.sort_by_key(|l| (l.abs_diff(k), *l));
+        references.into_iter().map(|l| (l, frames[l].world_from_camera)).collect()
+    }
+
     fn apply(&mut self, frames: &[ContinuityFrame], piece: Range<usize>, fit: &Fit) {
         self.energy.add(fit);
         let mut judgements = fit.judgements.iter();
@@ -124,8 +199,9 @@ impl Continuity {
     }
 }
 
-fn measured(frame: &ContinuityFrame) -> Option<Measured> {
+fn measured(frame: &ContinuityFrame, held: Held) -> Option<Measured> {
     frame.noise.map(|noise| Measured {
+        held,
         timestamp: frame.timestamp,
         shutter: frame.shutter(),
         exposure: frame.world_from_camera,

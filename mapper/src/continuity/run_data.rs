@@ -2,7 +2,9 @@
 
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use super::{Continuity, ContinuityError, ContinuityFrame, ContinuitySettings, PoseNoise, repair};
+use super::{
+    Continuity, ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, PoseNoise, repair_by_evidence,
+};
 use crate::evaluation::{motion_of, quantile};
 use crate::run::{FrameRecord, FrameStatus};
 use crate::trajectory_file::TimedExposure;
@@ -22,18 +24,20 @@ pub struct RepairedRun {
 /// Repairs the exposures of a run: one exposure, one record and one exposure time (seconds) per frame, in order of time.
 ///
 /// Lost frames measure nothing. The noise of the others is what is typical of tracked frames, more for weak ones and
-/// for those with a residual above the usual.
+/// for those with a residual above the usual. What the frames show has the last word, as in [`repair_by_evidence`];
+/// frames with the status ok are trusted.
 ///
 /// # Errors
-/// As [`repair`], and [`ContinuityError::Lengths`].
+/// As [`repair`](super::repair), and [`ContinuityError::Lengths`].
 pub fn repair_run(
     exposures: &[TimedExposure],
     records: &[FrameRecord],
     exposure_seconds: &[f64],
     settings: &ContinuitySettings,
+    evidence: &Evidence<'_>,
 ) -> Result<RepairedRun, ContinuityError> {
     let frames = run_frames(exposures, records, exposure_seconds)?;
-    let continuity = repair(&frames, settings)?;
+    let continuity = repair_by_evidence(&frames, settings, evidence)?;
     let exposures = exposures
         .iter()
         .zip(&continuity.exposures)
@@ -42,7 +46,7 @@ pub fn repair_run(
     Ok(RepairedRun { exposures, continuity })
 }
 
-/// The frames of a run as [`repair`] and [`predict_motions`](super::predict_motions) take them.
+/// The frames of a run as [`repair`](super::repair) and [`predict_motions`](super::predict_motions) take them.
 ///
 /// # Errors
 /// [`ContinuityError::Lengths`].
@@ -64,6 +68,7 @@ pub fn run_frames(
         exposure_seconds,
         world_from_camera: motion_of(exposure),
         noise: noise(exposure, record, usual_residual),
+        trusted: record.status == FrameStatus::Ok,
     };
     Ok(given.map(frame).collect())
 }

@@ -81,7 +81,8 @@ impl<'a> Screen<'a> {
     /// surprises less than its neighbour, which is expected to lie between two others.
     fn culprit(&self, k: usize) -> usize {
         let beside = self.before(k, None).take(1).chain(self.after(k, None).take(1));
-        let candidates: Vec<usize> = [k].into_iter().chain(beside).collect();
+        let free = |l: &usize| !self.measured[*l].held.place;
+        let candidates: Vec<usize> = [k].into_iter().chain(beside.filter(free)).collect();
         let disagreement = |&absent: &usize| {
             let others = candidates.iter().filter(|&&other| other != absent);
             others.flat_map(|&other| self.errors(other, Some(absent), false)).fold(0.0, f64::max)
@@ -97,11 +98,11 @@ impl<'a> Screen<'a> {
     }
 
     /// Distance of every frame in its place from its prediction in expected errors, which grow to what is typical of
-    /// the part; 0 for outliers.
+    /// the part; 0 for outliers, and for frames that other evidence holds in their place.
     fn surprises(&self) -> Vec<f64> {
-        let errors: Vec<Option<[f64; 2]>> = (0..self.measured.len())
-            .map(|k| (!self.judgements[k].outlier).then(|| self.errors(k, None, true)))
-            .collect();
+        let suspect = |k: usize| !self.judgements[k].outlier && !self.measured[k].held.place;
+        let errors: Vec<Option<[f64; 2]>> =
+            (0..self.measured.len()).map(|k| suspect(k).then(|| self.errors(k, None, true))).collect();
         let growth = [0, 1].map(|part| {
             let of_part: Vec<f64> = errors.iter().flatten().map(|both| both[part]).collect();
             (quantile(&of_part, 0.5).unwrap_or(0.0) / MEDIAN_NORM_3).max(1.0)

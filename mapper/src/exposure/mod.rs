@@ -7,7 +7,9 @@
 mod path;
 mod renderer;
 mod scratch;
+mod timing;
 
 pub use path::{ExposurePath, PATH_PARAMETERS};
 pub use renderer::ExposureRenderer;
 pub use scratch::ExposureScratch;
+pub use timing::{RowTimes, RowTiming};

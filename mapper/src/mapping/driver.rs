@@ -75,7 +75,7 @@ pub fn map_dataset(
     mut observe: impl FnMut(MapProgress),
 ) -> Result<Summary, MapError> {
     let started = Instant::now();
-    let mut frames = Frames::new(dataset, run)?;
+    let mut frames = Frames::new(dataset, run, settings.continuity)?;
     let identity = identity(dataset, run, settings);
     let checkpoint = out.join(CHECKPOINT_FILE);
     let saved: Option<Saved> =

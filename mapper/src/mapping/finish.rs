@@ -37,7 +37,7 @@ impl<'a> Finish<'a> {
         records: &[FrameRecord],
         settings: &'a MapSettings,
     ) -> Result<Self, MapError> {
-        let frames = Frames::of(dataset, exposures, records)?;
+        let frames = Frames::of(dataset, exposures, records, settings.continuity)?;
         for k in 0..bundle.keyframes().len() {
             let index = bundle.keyframes()[k].index;
             bundle.set_prior(k, frames.priors[index]);

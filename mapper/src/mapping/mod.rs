@@ -9,6 +9,7 @@ mod between;
 mod choice;
 mod driver;
 mod error;
+mod evidence;
 mod finish;
 mod merit;
 mod output;

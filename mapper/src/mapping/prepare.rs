@@ -4,10 +4,11 @@ use mba_tracker::SimdLevel;
 use rayon::prelude::*;
 
 use super::choice::choose_keyframes;
+use super::evidence::FrameEvidence;
 use super::{MapError, MapSettings};
 use crate::bundle::{BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor};
 use crate::continuity::{
-    ContinuitySettings, FrameVerdict, RepairedRun, predict_motions, repair_run, run_frames,
+    ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
 };
 use crate::dataset::Dataset;
 use crate::evaluation::motion_of;
@@ -31,6 +32,8 @@ pub(super) struct Frames {
     pub(super) priors: Vec<PathPrior>,
     /// What was odd, one sentence each.
     pub(super) warnings: Vec<String>,
+    /// Whether neighbours say anything about a frame.
+    continuity: bool,
 }
 
 /// How frames of the data set become observations.
@@ -45,37 +48,61 @@ pub(crate) fn sensor(dataset: &Dataset) -> Sensor {
 }
 
 impl Frames {
-    /// Repairs the exposures of a run.
-    pub(super) fn new(dataset: &Dataset, run: &Run) -> Result<Self, MapError> {
+    /// Repairs the exposures of a run, unless `continuity` is left out.
+    pub(super) fn new(dataset: &Dataset, run: &Run, continuity: bool) -> Result<Self, MapError> {
         check_frames(dataset, run)?;
-        Self::of(dataset, &run.exposures, &run.frames)
+        Self::of(dataset, &run.exposures, &run.frames, continuity)
     }
 
-    /// Repairs the exposures of all frames of the data set.
+    /// Repairs the exposures of all frames of the data set. Without `continuity` all of them stay as they are, and no
+    /// frame says anything about another.
     pub(super) fn of(
         dataset: &Dataset,
         exposures: &[TimedExposure],
         records: &[FrameRecord],
+        continuity: bool,
     ) -> Result<Self, MapError> {
+        if !continuity {
+            return Ok(Self::unrelated(exposures, records));
+        }
         let seconds = exposure_seconds(dataset);
         let settings = ContinuitySettings::default();
-        let repaired = repair_run(exposures, records, &seconds, &settings)?;
+        let evidence = FrameEvidence::new(dataset);
+        let compare = |suspicion: &Suspicion<'_>| evidence.compare(suspicion);
+        let repaired = repair_run(exposures, records, &seconds, &settings, &compare)?;
         let frames = run_frames(&repaired.exposures, records, &seconds)?;
         let motions = predict_motions(&frames, &settings).into_iter();
         let prior = |(motion, exposure)| PathPrior { middle: motion_of(exposure).mid(), motion };
         let priors = motions.zip(&repaired.exposures).map(prior).collect();
         let warnings = repairs(&repaired, "before");
-        Ok(Self { exposures: repaired.exposures, records: records.to_vec(), priors, warnings })
+        Ok(Self { exposures: repaired.exposures, records: records.to_vec(), priors, warnings, continuity })
     }
 
-    /// Repairs exposures that were refined, and tells what was done.
+    fn unrelated(exposures: &[TimedExposure], records: &[FrameRecord]) -> Self {
+        let prior = |exposure| PathPrior { middle: motion_of(exposure).mid(), motion: None };
+        Self {
+            exposures: exposures.to_vec(),
+            records: records.to_vec(),
+            priors: exposures.iter().map(prior).collect(),
+            warnings: Vec::new(),
+            continuity: false,
+        }
+    }
+
+    /// Repairs exposures that were refined, unless continuity is left out, and tells what was done.
     pub(super) fn repair(
         &self,
         dataset: &Dataset,
         refined: &[TimedExposure],
     ) -> Result<(Vec<TimedExposure>, Vec<String>), MapError> {
+        if !self.continuity {
+            return Ok((refined.to_vec(), Vec::new()));
+        }
         let settings = ContinuitySettings::default();
-        let repaired = repair_run(refined, &self.records, &exposure_seconds(dataset), &settings)?;
+        let evidence = FrameEvidence::new(dataset);
+        let compare = |suspicion: &Suspicion<'_>| evidence.compare(suspicion);
+        let seconds = exposure_seconds(dataset);
+        let repaired = repair_run(refined, &self.records, &seconds, &settings, &compare)?;
         let warnings = repairs(&repaired, "after");
         Ok((repaired.exposures, warnings))
     }
@@ -120,8 +147,18 @@ pub(super) fn observation(
     sensor: &Sensor,
     index: usize,
 ) -> Result<ObservationPyramid, String> {
+    observation_of(dataset, sensor, index, LEVELS)
+}
+
+/// Reads a frame at that many resolutions.
+pub(super) fn observation_of(
+    dataset: &Dataset,
+    sensor: &Sensor,
+    index: usize,
+    levels: usize,
+) -> Result<ObservationPyramid, String> {
     let frame = dataset.frame(index).map_err(|error| error.to_string())?;
-    ObservationPyramid::new(sensor, &frame, LEVELS).ok_or_else(|| "its size is not the camera's".to_owned())
+    ObservationPyramid::new(sensor, &frame, levels).ok_or_else(|| "its size is not the camera's".to_owned())
 }
 
 fn check_frames(dataset: &Dataset, run: &Run) -> Result<(), MapError> {

@@ -13,6 +13,8 @@ pub struct MapSettings {
     pub kind: MapKind,
     /// Whether motion during the exposure is modelled.
     pub blur: bool,
+    /// Whether frames are repaired and their motions predicted by what their neighbours do.
+    pub continuity: bool,
     /// Upper bound of virtual views per exposure; `None` for the schedule's own.
     pub virtual_views: Option<usize>,
     /// Most keyframes; further frames are fitted to the finished map. At least 1.
@@ -32,6 +34,7 @@ impl Default for MapSettings {
         Self {
             kind: MapKind::default(),
             blur: true,
+            continuity: true,
             virtual_views: None,
             max_keyframes: 100,
             max_gaussians: None,
@@ -49,6 +52,7 @@ const PIXELS_PER_GAUSSIAN: usize = 3;
 #[derive(Serialize)]
 pub(super) struct Decisive {
     bundle: BundleSettings,
+    continuity: bool,
     max_keyframes: usize,
     timed: bool,
 }
@@ -69,6 +73,7 @@ impl MapSettings {
     pub(super) fn decisive(&self, pixels: usize) -> Decisive {
         Decisive {
             bundle: self.bundle(pixels),
+            continuity: self.continuity,
             max_keyframes: self.max_keyframes,
             timed: self.time_budget.is_some(),
         }

@@ -46,6 +46,8 @@ pub struct SlamSettings {
     pub depth_term: bool,
     /// Whether places that are seen again correct the drift.
     pub loops: bool,
+    /// Whether the refinement after the last frame repairs frames and predicts their motions by what their neighbours do.
+    pub continuity: bool,
     /// Most keyframes at a time, at least 2; beyond it those that add the least are given up.
     pub max_keyframes: usize,
     /// Most Gaussians; `None` for one that grows with what was seen.
@@ -67,6 +69,7 @@ impl Default for SlamSettings {
             reference: SlamReference::default(),
             depth_term: true,
             loops: true,
+            continuity: true,
             max_keyframes: 100,
             max_gaussians: None,
             time_budget: None,
@@ -97,6 +100,7 @@ impl SlamSettings {
         MapSettings {
             kind: self.kind,
             blur: self.blur,
+            continuity: self.continuity,
             virtual_views: self.virtual_views,
             max_keyframes: self.max_keyframes,
             max_gaussians: self.max_gaussians,

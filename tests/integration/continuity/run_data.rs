@@ -42,7 +42,7 @@ fn only_faulty_exposures_of_a_run_change() {
     let seconds = vec![shaken.frames[0].exposure_seconds; FRAMES];
     let settings = ContinuitySettings::default();
 
-    let repaired = repair_run(&given, &records, &seconds, &settings).expect("a valid run");
+    let repaired = repair_run(&given, &records, &seconds, &settings, &|_| None).expect("a valid run");
     let verdicts = &repaired.continuity.verdicts;
     assert_eq!(
         [verdicts[12], verdicts[30], verdicts[61]],
@@ -58,6 +58,7 @@ fn only_faulty_exposures_of_a_run_change() {
         assert!(error < 0.005, "frame {k}: {error}");
     }
 
-    let error = repair_run(&given, &records[1..], &seconds, &settings).expect_err("a record is missing");
+    let error =
+        repair_run(&given, &records[1..], &seconds, &settings, &|_| None).expect_err("a record is missing");
     assert_eq!(error, ContinuityError::Lengths { exposures: FRAMES, records: FRAMES - 1, seconds: FRAMES });
 }

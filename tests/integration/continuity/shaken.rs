@@ -42,6 +42,7 @@ impl Shaken {
                 exposure_seconds: config.exposure_seconds,
                 world_from_camera: measured,
                 noise: Some(PoseNoise::typical(&measured)),
+                trusted: true,
             }
         });
         Self { frames: frames.collect(), truth }

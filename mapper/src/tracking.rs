@@ -6,7 +6,7 @@ use mba_tracker::error::{ConfigError, FrameError as TrackError};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 use mba_tracker::trajectory::ExposureTrajectory;
-use mba_tracker::{Frame, FrameResult, ReferenceMode, SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{Frame, FrameResult, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig};
 
 use crate::dataset::{Dataset, FrameError, RgbdFrame};
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter};
@@ -53,9 +53,25 @@ pub fn tracker_config(dataset: &Dataset, options: &TrackingOptions) -> TrackerCo
     config.reference = options.reference;
     config.align.blur = options.blur;
     config.align.depth_term = options.depth_term;
+    // What is unknown is taken for zero: a run that claims nothing about rows is that of a global shutter.
+    config.readout = Readout {
+        colour: calibration.readout.readout_seconds().unwrap_or(0.0),
+        depth: calibration.depth_readout_seconds,
+        depth_apart: depth_is_apart(dataset),
+        bands: Readout::GLOBAL.bands,
+    };
     config.align.max_views =
         options.virtual_views.unwrap_or(config.align.max_views).min(config.align.max_views);
     config
+}
+
+/// Time between colour and depth, seconds, that moves nothing: a tenth of a pixel at the speed of a shaking hand.
+const SAME_TIME: f64 = 1e-3;
+
+/// Whether any depth image was taken at another time than its colour image.
+fn depth_is_apart(dataset: &Dataset) -> bool {
+    let apart = |index| (dataset.depth_timestamp(index) - dataset.timestamp(index)).abs();
+    (0..dataset.len()).any(|index| apart(index) > SAME_TIME)
 }
 
 /// Tracks every frame of `dataset` in order and pushes it to `run`; `observe` is called after each with its record.
@@ -83,11 +99,15 @@ pub fn track_dataset(
                 given.push(index);
                 if let Some(revision) = &result.revision {
                     let revised = given.get(revision.index).copied().unwrap_or(index);
-                    let exposure = timed(dataset.timestamp(revised), &revision.world_from_camera);
+                    let exposure = timed(
+                        dataset.timestamp(revised),
+                        &revision.world_from_camera,
+                        &revision.world_from_mid,
+                    );
                     run.revise(revised, exposure, f64::from(revision.blur));
                 }
                 let record = record(&result, ms);
-                run.push(timed(result.timestamp, &result.world_from_camera), record)?;
+                run.push(timed_result(&result), record)?;
                 record
             }
             Err(reason) => {
@@ -123,9 +143,18 @@ fn track_frame(
     Ok((result, begin.elapsed().as_secs_f64() * 1e3))
 }
 
-/// An exposure with linear motion.
-pub(crate) fn timed(timestamp: f64, path: &ExposureTrajectory) -> TimedExposure {
-    TimedExposure { timestamp, start: path.start, mid: path.mid(), end: path.end }
+/// The three poses of an exposure whose ends are those of `path`.
+pub(crate) fn timed(
+    timestamp: f64,
+    path: &ExposureTrajectory,
+    world_from_mid: &RigidTransform,
+) -> TimedExposure {
+    TimedExposure { timestamp, start: path.start, mid: *world_from_mid, end: path.end }
+}
+
+/// The three poses of a tracked frame.
+pub(crate) fn timed_result(result: &FrameResult) -> TimedExposure {
+    timed(result.timestamp, &result.world_from_camera, &result.world_from_mid)
 }
 
 /// A frame as the tracker takes it.
@@ -134,6 +163,7 @@ pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
     Ok(Frame {
         timestamp: image.timestamp,
         exposure: image.exposure_seconds,
+        depth_timestamp: image.depth_timestamp,
         colour: ColourView::new(&image.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,
         depth: DepthView::new(&image.depth, width, height, width)?,
         angular_velocity: None,

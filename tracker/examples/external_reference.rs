@@ -38,7 +38,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let truth = room::exposure(timestamp);
         let picture = room::photograph(&truth);
         let (colour, depth) = picture.views()?;
-        let frame = Frame { timestamp, exposure: EXPOSURE, colour, depth, angular_velocity: None };
+        let frame = Frame {
+            timestamp,
+            exposure: EXPOSURE,
+            depth_timestamp: timestamp,
+            colour,
+            depth,
+            angular_velocity: None,
+        };
         let map_from_camera = tracker.track(&frame)?.world_from_camera;
 
         let millimetres = 1000.0 * (map_from_camera.mid().translation - truth.mid().translation).norm();

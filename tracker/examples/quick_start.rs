@@ -19,7 +19,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let timestamp = f64::from(k) / 30.0;
         let picture = room::photograph(&room::exposure(timestamp));
         let (colour, depth) = picture.views()?;
-        let frame = Frame { timestamp, exposure: EXPOSURE, colour, depth, angular_velocity: None };
+        let frame = Frame {
+            timestamp,
+            exposure: EXPOSURE,
+            depth_timestamp: timestamp,
+            colour,
+            depth,
+            angular_velocity: None,
+        };
         let result = tracker.track(&frame)?;
 
         let [opened, closed] = [result.world_from_camera.start, result.world_from_camera.end]

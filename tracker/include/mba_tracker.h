@@ -59,6 +59,9 @@ typedef struct MbaTracker MbaTracker;
 // The memory does not hold a tracker.
 #define MBA_ERROR_NOT_INITIALISED 12
 
+// The time of a depth image is not finite or more than 0.2 s from that of its colour image.
+#define MBA_ERROR_DEPTH_TIMESTAMP 13
+
 // One byte per pixel.
 #define MBA_PIXEL_GREY8 1
 
@@ -114,6 +117,14 @@ typedef struct {
   uint32_t surface_level;
   // Earlier keyframes that a lost tracker looks for, 0 to 4.
   uint32_t recent_keyframes;
+  // Bands of rows that share their virtual views, 1 to 16; counts only where the readout is not 0.
+  uint32_t row_bands;
+  // 1 when depth images are taken at times of their own, `MbaFrame.depth_timestamp`; 0 when together with the colour images.
+  uint32_t depth_apart;
+  // Seconds from the first row of a colour image to the last, -0.1 to 0.1; 0 for a global shutter.
+  double readout_seconds;
+  // Seconds from the first row of a depth image to the last, -0.1 to 0.1.
+  double depth_readout_seconds;
   // `MBA_REFERENCE_*`.
   int32_t reference;
   // `MBA_EFFORT_*`.
@@ -157,10 +168,12 @@ typedef struct {
 
 // One RGB-D frame.
 typedef struct {
-  // Mid-exposure time in seconds.
+  // Mid-exposure time in seconds; with rows that are exposed one after the other, of the middle row.
   double timestamp;
-  // Exposure time in seconds.
+  // Exposure time in seconds, of every row.
   double exposure;
+  // Time of the depth image's middle row in seconds; ignored unless the configuration says `depth_apart`.
+  double depth_timestamp;
   // Colour or grey image.
   MbaImage image;
   // Depth image.

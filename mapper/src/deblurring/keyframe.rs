@@ -4,15 +4,17 @@ use mba_tracker::deblur::DeblurScratch;
 use mba_tracker::error::FrameError as ImageError;
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::image::{DepthView, PixelRectangle};
+use mba_tracker::keyframe::RectifyScratch;
 use mba_tracker::photometric::InverseResponse;
 use mba_tracker::surface::{InverseDepthMap, SurfacePlanes};
-use mba_tracker::trajectory::ExposureTrajectory;
+use mba_tracker::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
 use mba_tracker::workspace::{ARENA_ALIGNMENT, Arena, WorkspaceError, slice_bytes};
-use mba_tracker::{SimdLevel, TrackerConfig};
+use mba_tracker::{Readout, SimdLevel, TrackerConfig};
 
 use super::ForwardResponse;
 use crate::dataset::{FrameError, RgbdFrame};
+use crate::trajectory_file::TimedExposure;
 
 /// Longest motion within an image, pixels, that is worth deblurring: below, rounding to bytes and noise hide it;
 /// above, the virtual views lie too far apart to describe it.
@@ -67,6 +69,7 @@ pub struct KeyframeDeblurrer {
     region: PixelRectangle,
     inverse: InverseResponse,
     forward: ForwardResponse,
+    readout: Readout,
     simd: SimdLevel,
 }
 
@@ -86,6 +89,7 @@ impl KeyframeDeblurrer {
             region: config.region,
             inverse: config.response.clone(),
             forward: ForwardResponse::new(&config.response),
+            readout: config.readout,
             simd,
         }
     }
@@ -96,11 +100,19 @@ impl KeyframeDeblurrer {
         let PinholeCamera { width, height, .. } = self.camera;
         let surface = slice_bytes::<f32>((width >> self.surface_level) * (height >> self.surface_level));
         let light = slice_bytes::<f32>(width * height);
-        DeblurMemory(vec![0; ARENA_ALIGNMENT + DeblurScratch::bytes(width, height) + 4 * surface + light])
+        let rectify = RectifyScratch::bytes(width, height, self.surface_level, self.rolls(), self.rolls());
+        let deblur = DeblurScratch::bytes(width, height);
+        DeblurMemory(vec![0; ARENA_ALIGNMENT + deblur + rectify + 4 * surface + light])
     }
 
-    /// Deblurs the colours of `frame`, whose camera moved along `exposure` (poses `reference_from_camera` in any
-    /// reference frame, metres) while the shutter was open. The sharp image is what the camera sees at mid exposure.
+    /// Whether the rows of colour images have times of their own.
+    fn rolls(&self) -> bool {
+        self.readout.colour_rolls()
+    }
+
+    /// Deblurs the colours of `frame`, whose camera moved through the poses of `exposure` (`reference_from_camera` in any
+    /// reference frame, metres) while the shutter was open. The sharp image is what the camera sees at mid exposure, all
+    /// rows at the same time.
     ///
     /// Each colour is linearised and deblurred by Richardson-Lucy iterations along the path that its own depth map
     /// gives every pixel (the image formation of MBA-SLAM eq. 5, inverted).
@@ -110,7 +122,7 @@ impl KeyframeDeblurrer {
     pub fn deblur(
         &self,
         frame: &RgbdFrame,
-        exposure: &ExposureTrajectory,
+        exposure: &TimedExposure,
         memory: &mut DeblurMemory,
     ) -> Result<Deblurred, DeblurError> {
         self.check(frame)?;
@@ -118,17 +130,35 @@ impl KeyframeDeblurrer {
         let mut arena = Arena::new(&mut memory.0);
         let mut scratch = DeblurScratch::carve(&mut arena, width, height)?;
         let light = arena.take::<f32>(width * height)?;
-        let longest = self.fill_flow(frame, exposure, &mut scratch, &mut arena)?;
+        let mut rectify =
+            RectifyScratch::carve(&mut arena, &self.camera, self.surface_level, self.rolls(), self.rolls())?;
+        let path = FramePath::new(frame, exposure, &self.readout);
+        let surface = self.surface(frame, &path, &mut rectify, &mut arena)?;
+        let longest = self.fill_flow(&path, &surface, &mut scratch);
         let captured = || Deblurred { rgb: frame.rgb.clone(), sharpened: false };
-        if !BLUR_RANGE.contains(&longest) {
+        if !BLUR_RANGE.contains(&longest) && !self.rolls() {
             return Ok(captured());
         }
         let iterations = (longest.round() as usize).clamp(*ITERATIONS.start(), *ITERATIONS.end());
         let mut rgb = frame.rgb.clone();
         for channel in 0..3 {
             self.linearise(&frame.rgb, channel, light);
+            if self.rolls() {
+                rectify.capture(light, surface.map.values);
+                rectify.rectify_image(
+                    &path.reference_from_camera,
+                    &path.timing,
+                    &self.camera,
+                    light,
+                    &surface.map,
+                );
+                if !BLUR_RANGE.contains(&longest) {
+                    self.develop(light, channel, &mut rgb);
+                    continue;
+                }
+            }
             scratch.capture(light);
-            if !scratch.deblur(self.simd, longest, iterations, light).kept {
+            if !scratch.deblur(self.simd, longest, iterations, light).kept && !self.rolls() {
                 // One blurred colour among sharp ones would show as coloured edges.
                 return Ok(captured());
             }
@@ -149,22 +179,37 @@ impl KeyframeDeblurrer {
         Ok(())
     }
 
-    /// Computes the path of every block of the image; returns the longest in pixels.
-    fn fill_flow<'m>(
+    /// Depth and planes as seen at mid exposure.
+    fn surface<'m>(
         &self,
         frame: &RgbdFrame,
-        exposure: &ExposureTrajectory,
-        scratch: &mut DeblurScratch<'m>,
+        path: &FramePath,
+        rectify: &mut RectifyScratch<'m>,
         arena: &mut Arena<'m>,
-    ) -> Result<f32, DeblurError> {
+    ) -> Result<Surface<'m>, DeblurError> {
         let raw = DepthView::new(&frame.depth, frame.width, frame.height, frame.width)?;
         let mut map = InverseDepthMap::carve(arena, &self.camera, self.surface_level)?;
         let mut planes = SurfacePlanes::carve(arena, &self.camera, self.surface_level)?;
         map.fill(&raw, self.metres_per_unit);
+        if self.rolls() {
+            let depth_time = 0.5 + path.timing.depth_time;
+            rectify.move_depth(&path.reference_from_camera.at(depth_time), &self.camera, &mut map);
+        }
         planes.fit(&map);
-        let seen_from_mid = exposure.seen_from(&exposure.mid().inverse());
-        let typical = median_measured(map.values);
-        Ok(scratch.flow.fill(&seen_from_mid, &self.camera, &planes, self.surface_level, typical))
+        Ok(Surface { map, planes })
+    }
+
+    /// Computes the path of every block of the image; returns the longest in pixels.
+    fn fill_flow(&self, path: &FramePath, surface: &Surface, scratch: &mut DeblurScratch) -> f32 {
+        let typical = median_measured(surface.map.values);
+        scratch.flow.fill(
+            &path.reference_from_camera,
+            &path.timing,
+            &self.camera,
+            &surface.planes,
+            self.surface_level,
+            typical,
+        )
     }
 
     /// Linear light of one colour. Where undistortion left no data, the nearest data is continued: its black border
@@ -190,6 +235,39 @@ impl KeyframeDeblurrer {
                 rgb[3 * index + channel] = self.forward.encode(light[index]);
             }
         }
+    }
+}
+
+/// Depth and planes of an image.
+struct Surface<'m> {
+    map: InverseDepthMap<'m>,
+    planes: SurfacePlanes<'m>,
+}
+
+/// How a frame moved, seen from its own mid pose; s = 0 and 1 are opening and closing of the middle row.
+struct FramePath {
+    reference_from_camera: BowedTrajectory,
+    timing: FrameTiming,
+}
+
+impl FramePath {
+    fn new(frame: &RgbdFrame, exposure: &TimedExposure, readout: &Readout) -> Self {
+        let span = frame.exposure_seconds;
+        if !readout.colour_rolls() || span <= 0.0 {
+            let linear = ExposureTrajectory { start: exposure.start, end: exposure.end };
+            let seen_from_mid = linear.seen_from(&linear.mid().inverse());
+            let reference_from_camera = BowedTrajectory::without_bow(seen_from_mid);
+            return Self { reference_from_camera, timing: FrameTiming::GLOBAL };
+        }
+        let path = BowedTrajectory::through(&exposure.start, &exposure.mid, &exposure.end);
+        let timing = FrameTiming {
+            exposure: 1.0,
+            readout: readout.colour / span,
+            bands: readout.bands,
+            depth_time: (frame.depth_timestamp - frame.timestamp) / span,
+            depth_readout: readout.depth / span,
+        };
+        Self { reference_from_camera: path.seen_from(&exposure.mid.inverse()), timing }
     }
 }
 

@@ -1,6 +1,5 @@
 //! The keyframes of a run, all at once.
 
-use mba_tracker::trajectory::ExposureTrajectory;
 use mba_tracker::{SimdLevel, TrackerConfig};
 use rayon::prelude::*;
 
@@ -59,8 +58,7 @@ fn write_keyframe(
     memory: &mut DeblurMemory,
 ) -> Result<(), Failure> {
     let frame = dataset.frame(index).map_err(DeblurError::from)?;
-    let path = ExposureTrajectory { start: exposure.start, end: exposure.end };
-    let deblurred = deblurrer.deblur(&frame, &path, memory)?;
+    let deblurred = deblurrer.deblur(&frame, exposure, memory)?;
     run.write_deblurred(index, [frame.width, frame.height], deblurred.rgb)?;
     Ok(())
 }

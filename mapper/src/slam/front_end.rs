@@ -11,7 +11,7 @@ use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink
 use super::pace::Pace;
 use super::settings::Arrival;
 use crate::dataset::Dataset;
-use crate::tracking::{TrackingError, held, record, timed, tracker_view};
+use crate::tracking::{TrackingError, held, record, timed, timed_result, tracker_view};
 use crate::trajectory_file::TimedExposure;
 
 /// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
@@ -105,10 +105,11 @@ impl FrontEnd<'_, '_> {
         self.given.push(index);
         let revision = result.revision.as_ref().and_then(|revision| {
             let revised = self.given.index(revision.index)?;
-            let exposure = timed(self.dataset.timestamp(revised), &revision.world_from_camera);
+            let timestamp = self.dataset.timestamp(revised);
+            let exposure = timed(timestamp, &revision.world_from_camera, &revision.world_from_mid);
             Some((revised, exposure, f64::from(revision.blur)))
         });
-        let exposure = timed(result.timestamp, &result.world_from_camera);
+        let exposure = timed_result(&result);
         self.last = Some(exposure);
         let record = record(&result, ms);
         TrackedFrame {

@@ -78,6 +78,7 @@ fn frame_of(frame: &RenderedFrame) -> MbaFrame {
             height,
             stride_bytes: 2 * width,
         },
+        depth_timestamp: frame.timestamp,
         angular_velocity: core::ptr::null(),
     }
 }

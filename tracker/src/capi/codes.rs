@@ -30,6 +30,8 @@ pub const MBA_ERROR_POSE: i32 = 10;
 pub const MBA_ERROR_ANGULAR_VELOCITY: i32 = 11;
 /// The memory does not hold a tracker.
 pub const MBA_ERROR_NOT_INITIALISED: i32 = 12;
+/// The time of a depth image is not finite or more than 0.2 s from that of its colour image.
+pub const MBA_ERROR_DEPTH_TIMESTAMP: i32 = 13;
 
 /// One byte per pixel.
 pub const MBA_PIXEL_GREY8: i32 = 1;
@@ -74,6 +76,9 @@ pub(super) const fn describe(code: i32) -> &'static CStr {
         MBA_ERROR_POSE => c"pose is not finite or its quaternion not of unit length",
         MBA_ERROR_ANGULAR_VELOCITY => c"angular velocity is not finite",
         MBA_ERROR_NOT_INITIALISED => c"memory holds no tracker",
+        MBA_ERROR_DEPTH_TIMESTAMP => {
+            c"depth timestamp is not finite or more than 0.2 s from that of the image"
+        }
         _ => c"unknown code",
     }
 }
@@ -97,6 +102,7 @@ pub(super) fn code_of_frame(error: FrameError) -> i32 {
         FrameError::Buffer { .. } => MBA_ERROR_SHORT_BUFFER,
         FrameError::Size { .. } => MBA_ERROR_IMAGE_SIZE,
         FrameError::Timestamp { .. } => MBA_ERROR_TIMESTAMP,
+        FrameError::DepthTimestamp { .. } => MBA_ERROR_DEPTH_TIMESTAMP,
         FrameError::Pose => MBA_ERROR_POSE,
         FrameError::Exposure { .. } => MBA_ERROR_EXPOSURE,
     }

@@ -13,7 +13,7 @@ use crate::align::UNKNOWNS;
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{ColourView, DepthView, PixelFormat};
 use crate::photometric::InverseResponse;
-use crate::{Effort, Frame, FrameResult, FrameStatus, ReferenceMode, ReferenceView, TrackerConfig};
+use crate::{Effort, Frame, FrameResult, FrameStatus, Readout, ReferenceMode, ReferenceView, TrackerConfig};
 
 /// The configuration that C asks for, checked.
 ///
@@ -40,10 +40,22 @@ pub(super) unsafe fn config(c: &MbaConfig) -> Result<TrackerConfig, i32> {
         MBA_EFFORT_LOW => Effort::Low,
         _ => return Err(MBA_ERROR_CONFIG),
     };
+    let depth_apart = match c.depth_apart {
+        0 => false,
+        1 => true,
+        _ => return Err(MBA_ERROR_CONFIG),
+    };
+    let readout = Readout {
+        colour: c.readout_seconds,
+        depth: c.depth_readout_seconds,
+        depth_apart,
+        bands: c.row_bands as usize,
+    };
     let config = TrackerConfig {
         levels: c.levels as usize,
         surface_level: c.surface_level as usize,
         recent_keyframes: c.recent_keyframes as usize,
+        readout,
         reference,
         ..TrackerConfig::new(camera, c.metres_per_unit, response).with_effort(effort)
     };
@@ -65,6 +77,10 @@ pub(super) fn settings(config: &TrackerConfig) -> MbaConfig {
         levels: config.levels as u32,
         surface_level: config.surface_level as u32,
         recent_keyframes: config.recent_keyframes as u32,
+        row_bands: config.readout.bands as u32,
+        depth_apart: u32::from(config.readout.depth_apart),
+        readout_seconds: config.readout.colour,
+        depth_readout_seconds: config.readout.depth,
         reference: match config.reference {
             ReferenceMode::Deblurred => MBA_REFERENCE_DEBLURRED,
             ReferenceMode::Raw => MBA_REFERENCE_RAW,
@@ -125,7 +141,14 @@ pub(super) unsafe fn frame<'a>(frame: &MbaFrame) -> Result<Frame<'a>, i32> {
     };
     // SAFETY: passed on from the caller.
     let (colour, depth) = unsafe { (colour(&frame.image)?, depth(&frame.depth)?) };
-    Ok(Frame { timestamp: frame.timestamp, exposure: frame.exposure, colour, depth, angular_velocity })
+    Ok(Frame {
+        timestamp: frame.timestamp,
+        exposure: frame.exposure,
+        depth_timestamp: frame.depth_timestamp,
+        colour,
+        depth,
+        angular_velocity,
+    })
 }
 
 /// A view from outside.

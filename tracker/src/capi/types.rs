@@ -26,6 +26,15 @@ pub struct MbaConfig {
     pub surface_level: u32,
     /// Earlier keyframes that a lost tracker looks for, 0 to 4.
     pub recent_keyframes: u32,
+    /// Bands of rows that share their virtual views, 1 to 16; counts only where the readout is not 0.
+    pub row_bands: u32,
+    /// 1 when depth images are taken at times of their own, `MbaFrame.depth_timestamp`; 0 when together with the colour
+    /// images.
+    pub depth_apart: u32,
+    /// Seconds from the first row of a colour image to the last, -0.1 to 0.1; 0 for a global shutter.
+    pub readout_seconds: f64,
+    /// Seconds from the first row of a depth image to the last, -0.1 to 0.1.
+    pub depth_readout_seconds: f64,
     /// `MBA_REFERENCE_*`.
     pub reference: i32,
     /// `MBA_EFFORT_*`.
@@ -75,10 +84,12 @@ pub struct MbaDepth {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct MbaFrame {
-    /// Mid-exposure time in seconds.
+    /// Mid-exposure time in seconds; with rows that are exposed one after the other, of the middle row.
     pub timestamp: f64,
-    /// Exposure time in seconds.
+    /// Exposure time in seconds, of every row.
     pub exposure: f64,
+    /// Time of the depth image's middle row in seconds; ignored unless the configuration says `depth_apart`.
+    pub depth_timestamp: f64,
     /// Colour or grey image.
     pub image: MbaImage,
     /// Depth image.

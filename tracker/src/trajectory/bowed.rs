@@ -25,6 +25,22 @@ impl BowedTrajectory {
         Self { linear, bow: Vector6::zeros() }
     }
 
+    /// The path through the poses at s = 0, 1/2 and 1.
+    #[must_use]
+    pub fn through(start: &RigidTransform, mid: &RigidTransform, end: &RigidTransform) -> Self {
+        let before = mid.tangent_to(start);
+        let after = mid.tangent_to(end);
+        // A quarter of the bow is what both ends have in common. Turns do not commute, so that it is found in rounds; the
+        // error falls by the square of the angle in each.
+        let mut quarter = (before + after) * 0.5;
+        let mut linear = ExposureTrajectory { start: *start, end: *end };
+        for _ in 0..4 {
+            linear = ExposureTrajectory { start: start.perturbed(&-quarter), end: end.perturbed(&-quarter) };
+            quarter -= linear.mid().tangent_to(mid);
+        }
+        Self { linear, bow: quarter * 4.0 }
+    }
+
     /// `reference_from_camera` at normalised time `s`, also outside of `[0, 1]`.
     #[must_use]
     pub fn at(&self, s: f64) -> RigidTransform {
@@ -173,6 +189,16 @@ mod tests {
         for s in [-0.5, 0.2, 1.3] {
             let expected = other.compose(&path.at(s));
             assert!(path.seen_from(&other).at(s).tangent_to(&expected).norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn three_poses_define_the_path() {
+        let path = path();
+        let found = BowedTrajectory::through(&path.at(0.0), &path.at(0.5), &path.at(1.0));
+        for s in [-0.8, 0.3, 1.9] {
+            let error = found.at(s).tangent_to(&path.at(s)).norm();
+            assert!(error < 1e-9, "at {s}: {error}");
         }
     }
 

@@ -6,10 +6,10 @@ use mba_tracker::error::{ConfigError, FrameError as TrackError};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 use mba_tracker::trajectory::ExposureTrajectory;
-use mba_tracker::{Frame, FrameResult, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{Doubt, Frame, FrameResult, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig};
 
 use crate::dataset::{Dataset, FrameError, RgbdFrame};
-use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter};
+use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
 
 /// What can be chosen about the tracker; everything else follows from the data set.
@@ -188,6 +188,20 @@ pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
         residual: f64::from(result.residual),
         inliers: f64::from(result.inliers),
         gain: f64::from(result.brightness.gain),
+        reason: result.doubt.map(reason),
+    }
+}
+
+fn reason(doubt: Doubt) -> Reason {
+    match doubt {
+        Doubt::Blind => Reason::Blind,
+        Doubt::NoStart => Reason::NoStart,
+        Doubt::NoMatch => Reason::NoMatch,
+        Doubt::Speed => Reason::Speed,
+        Doubt::Brightness => Reason::Brightness,
+        Doubt::Inliers => Reason::Inliers,
+        Doubt::Residual => Reason::Residual,
+        Doubt::FoundAgain => Reason::FoundAgain,
     }
 }
 
@@ -206,6 +220,7 @@ pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposu
         residual: f64::NAN,
         inliers: 0.0,
         gain: f64::NAN,
+        reason: Some(Reason::Skipped),
     };
     (exposure, record)
 }

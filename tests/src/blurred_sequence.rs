@@ -135,6 +135,7 @@ impl BlurredSequence {
             residual: 0.01,
             inliers: 1.0,
             gain: 1.0,
+            reason: None,
         }
     }
 }

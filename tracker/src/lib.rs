@@ -83,7 +83,7 @@ pub mod workspace;
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;
 pub use tracker::{
-    Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, ReferenceView,
-    Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,
+    Doubt, Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode,
+    ReferenceView, Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,
 };
 pub use work::Work;

@@ -24,7 +24,7 @@ mod writer;
 
 pub use camera::{RunCamera, RunResponse};
 pub use error::RunError;
-pub use frame_record::{FrameRecord, FrameStatus};
+pub use frame_record::{FrameRecord, FrameStatus, Reason};
 pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
 pub use map::{MapFileError, StoredMap};
 pub use merit::{Merit, mid_pose, trajectory_figures};

@@ -16,6 +16,8 @@ pub(super) struct Motion {
     pub(super) between_frames: Vector6<f64>,
     /// Time since the frame before, seconds; infinite while there is none.
     pub(super) interval: f64,
+    /// Exposure time, seconds.
+    pub(super) exposure: f64,
     /// Motion during the exposure; `None` while it is unknown.
     pub(super) within_exposure: Option<Vector6<f64>>,
     /// Acceleration during the exposure, per square second; zero where it is not estimated.
@@ -47,6 +49,7 @@ impl Motion {
             reference_from_mid,
             between_frames: Vector6::zeros(),
             interval: f64::INFINITY,
+            exposure: 0.0,
             within_exposure: None,
             acceleration: Vector6::zeros(),
         }

@@ -16,5 +16,5 @@ pub use config::{
     Effort, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len,
 };
 pub use frame::{Frame, ReferenceView};
-pub use result::{FrameResult, FrameStatus, Revision};
+pub use result::{Doubt, FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

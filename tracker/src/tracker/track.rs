@@ -10,9 +10,9 @@ use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::Frame;
 use super::history::{Motion, rotated};
 use super::keyframe_path::{PathError, PathRate};
-use super::policy::{Evidence, Typical, fits_badly, judge, wants_keyframe};
+use super::policy::{Evidence, Typical, fits_badly, is_blind, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
-use super::result::{FrameResult, FrameStatus, Revision};
+use super::result::{Doubt, FrameResult, FrameStatus, Revision};
 use crate::align::{AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, ReferenceData, blur_length};
 use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
@@ -32,6 +32,19 @@ const MIN_STRENGTH: f32 = 0.02;
 /// Fewest keypoints on the finest level, and least share of measured depth, to start from.
 const MIN_START_KEYPOINTS: usize = 24;
 const MIN_START_DEPTH: f32 = 0.1;
+
+/// Inverse depth, 1/m, that a first frame can have on average: 5 cm to 100 m.
+const START_INVERSE_DEPTH: core::ops::Range<f32> = 0.01..20.0;
+
+/// Frames that may be lost right after a start until the next one starts anew: a start that nothing agrees with was one
+/// with damaged depth.
+const MAX_LOST_AT_START: usize = 2;
+
+/// Pixels by which the motion during an exposure may exceed that between frames: twice the error of a good blur length.
+const IMPOSSIBLE_MARGIN: f64 = 1.5;
+
+/// Pixels of expected blur from which its direction says which way time runs.
+const DIRECTED: f64 = 1.0;
 
 /// Largest time between a colour image and its depth image, seconds.
 const MAX_DEPTH_OFFSET: f64 = 0.2;
@@ -74,6 +87,12 @@ pub struct Tracker<'m> {
     span: f64,
     /// Seconds that the path of the keyframe's frame spans.
     keyframe_span: f64,
+    /// Running number of the last frame that was aligned, and what the next one taught about it.
+    last_index: usize,
+    late_revision: Option<Revision>,
+    /// Whether any frame was aligned since the start, and how many were lost before.
+    established: bool,
+    lost_at_start: usize,
     /// What is known about the error of the keyframe's path.
     path_error: PathError,
     /// Motion in the world; `None` before the first usable frame.
@@ -129,6 +148,10 @@ impl<'m> Tracker<'m> {
             timing: FrameTiming::GLOBAL,
             span: 0.0,
             keyframe_span: 0.0,
+            last_index: 0,
+            late_revision: None,
+            established: false,
+            lost_at_start: 0,
             path_error: PathError::unknown(&PathRate::repeat(1.0)),
             config: config.clone(),
             motion: None,
@@ -150,7 +173,10 @@ impl<'m> Tracker<'m> {
         self.pyramid.fill(&frame.colour, &self.luminance);
         self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
         (self.timing, self.span) = self.config.readout.timing(frame);
+        let blind = self.pyramid.levels.last().is_some_and(|coarsest| is_blind(coarsest.pixels));
         let mut result = match self.motion {
+            Some(motion) if blind => self.hold(frame, &motion, &self.nothing(&motion), Doubt::Blind),
+            None if blind => self.unstarted(frame, Doubt::Blind),
             None => self.start(frame),
             Some(motion) => self.follow(frame, &motion),
         };
@@ -206,13 +232,31 @@ impl<'m> Tracker<'m> {
         let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.promote(&origin, None, f32::MAX);
         let enough = self.keyframe.finest_keypoints().len() >= MIN_START_KEYPOINTS;
-        if enough && self.depth_share >= MIN_START_DEPTH {
+        let in_range = self.keyframe.depth.mean().is_some_and(|rho| START_INVERSE_DEPTH.contains(&rho));
+        result.doubt = Some(Doubt::NoStart);
+        if enough && in_range && self.depth_share >= MIN_START_DEPTH {
             self.motion = Some(Motion::still(frame.timestamp, origin));
+            self.established = false;
+            self.lost_at_start = 0;
             result.status = FrameStatus::Ok;
+            result.doubt = None;
             result.inliers = 1.0;
             result.is_keyframe = true;
         }
         result
+    }
+
+    /// The result of a frame that nothing can start from.
+    fn unstarted(&self, frame: &Frame, doubt: Doubt) -> FrameResult {
+        let still = ExposureTrajectory::still(RigidTransform::identity());
+        let nothing = LevelOutcome::unchanged(Estimate::linear(still));
+        FrameResult { doubt: Some(doubt), ..FrameResult::of(self.frames, frame.timestamp, still, &nothing) }
+    }
+
+    /// An alignment that was not tried.
+    fn nothing(&self, motion: &Motion) -> Aligned {
+        let still = ExposureTrajectory::still(motion.reference_from_mid);
+        Aligned { outcome: LevelOutcome::unchanged(Estimate::linear(still)), work: Work::none() }
     }
 
     fn follow(&mut self, frame: &Frame, motion: &Motion) -> FrameResult {
@@ -232,23 +276,32 @@ impl<'m> Tracker<'m> {
                 }
             }
         }
-        let mut status = self.judge(&aligned.outcome, motion, frame);
+        let (mut status, mut doubt) = self.judge(&aligned.outcome, motion, frame);
         if status == FrameStatus::Lost && self.recover(frame, motion) {
             let start = self.motion.unwrap_or(*motion);
             aligned = self.align(frame, &start, self.config.align.blur, None);
-            status = match self.judge(&aligned.outcome, &start, frame) {
-                FrameStatus::Lost => {
-                    return self.resume(frame, &start.reference_from_mid);
-                }
-                _ => FrameStatus::Weak,
-            };
+            if self.judge(&aligned.outcome, &start, frame).0 == FrameStatus::Lost {
+                return self.resume(frame, &start.reference_from_mid);
+            }
+            (status, doubt) = (FrameStatus::Weak, Some(Doubt::FoundAgain));
         }
-        let mut result = match status {
-            FrameStatus::Lost => self.hold(frame, motion, &aligned),
-            _ => self.accept(frame, motion, &aligned, status),
-        };
-        result.revision = revision;
+        if status == FrameStatus::Lost {
+            return self.lose(frame, motion, &aligned, doubt.unwrap_or(Doubt::NoMatch));
+        }
+        self.established = true;
+        let mut result = self.accept(frame, motion, &aligned, status);
+        result.doubt = doubt;
+        result.revision = revision.or(self.late_revision.take());
         result
+    }
+
+    /// Holds the last good pose; when the very first frames after a start all disagree with it, starts anew.
+    fn lose(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned, doubt: Doubt) -> FrameResult {
+        self.lost_at_start += 1;
+        if !self.established && self.lost_at_start >= MAX_LOST_AT_START {
+            return self.start(frame);
+        }
+        self.hold(frame, motion, aligned, doubt)
     }
 
     /// Goes on from a view that was found again near an older keyframe, out of sight of the current one: the frame
@@ -261,6 +314,7 @@ impl<'m> Tracker<'m> {
         self.promote(world_from_mid, None, f32::MAX);
         self.motion = Some(Motion::still(frame.timestamp, *world_from_mid));
         result.status = FrameStatus::Weak;
+        result.doubt = Some(Doubt::FoundAgain);
         result.is_keyframe = true;
         result
     }
@@ -275,7 +329,7 @@ impl<'m> Tracker<'m> {
         self.timing = FrameTiming::GLOBAL;
         let first = self.align(frame, motion, false, None);
         self.timing = timing;
-        if self.judge(&first.outcome, motion, frame) == FrameStatus::Lost {
+        if self.judge(&first.outcome, motion, frame).0 == FrameStatus::Lost {
             return (first, None);
         }
         let dt = frame.timestamp - motion.timestamp;
@@ -419,7 +473,7 @@ impl<'m> Tracker<'m> {
         aligned
     }
 
-    fn judge(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> FrameStatus {
+    fn judge(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> (FrameStatus, Option<Doubt>) {
         judge(outcome, &self.evidence(outcome, motion, frame), &self.typical)
     }
 
@@ -466,10 +520,13 @@ impl<'m> Tracker<'m> {
             between_frames: motion.reference_from_mid.tangent_to(&world_from_mid)
                 / (frame.timestamp - motion.timestamp),
             interval: frame.timestamp - motion.timestamp,
+            exposure: frame.exposure,
             within_exposure: self.path_is_modelled().then(|| world_path.linear.motion() / self.span),
             acceleration: world_path.bow * (2.0 / (self.span * self.span).max(f64::MIN_POSITIVE)),
         });
         self.brightness = outcome.estimate.brightness;
+        self.late_revision = self.revise_last(frame, motion, &world_from_mid);
+        self.last_index = self.frames;
         let correction = self.observe_path_error(frame, motion, &world_from_mid);
         if status == FrameStatus::Ok {
             self.typical.learn(outcome);
@@ -492,6 +549,57 @@ impl<'m> Tracker<'m> {
             }
         }
         result
+    }
+
+    /// Judges the exposure motion of the last frame, now that the poses on both sides of it are known.
+    ///
+    /// A shutter is open for at most the time between two frames, so that the picture cannot move farther during an
+    /// exposure than to the farther of its neighbours; and a blurred picture does not tell the direction of time. What is
+    /// impossible is replaced by the motion between the neighbours, what fits better reversed is reversed.
+    fn revise_last(
+        &self,
+        frame: &Frame,
+        motion: &Motion,
+        world_from_mid: &RigidTransform,
+    ) -> Option<Revision> {
+        let measured =
+            motion.within_exposure.filter(|_| motion.interval.is_finite() && motion.exposure > 0.0)?;
+        let dt = frame.timestamp - motion.timestamp;
+        let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
+        let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
+        let [within, farther_before, farther_after, of_slope] = [
+            measured * motion.exposure,
+            motion.between_frames * motion.interval,
+            next * dt,
+            slope * motion.exposure,
+        ]
+        .map(|way| self.way_in_pixels(&way));
+        let rate = if within > farther_before.max(farther_after) + IMPOSSIBLE_MARGIN {
+            slope
+        } else if !self.timing.is_rolling()
+            && of_slope > DIRECTED
+            && self.way_in_pixels(&(measured + slope)) < self.way_in_pixels(&(measured - slope))
+        {
+            -measured
+        } else {
+            return None;
+        };
+        let world_from_camera =
+            ExposureTrajectory::from_mid_and_motion(&motion.reference_from_mid, &(rate * motion.exposure));
+        let seen = world_from_camera.seen_from(&self.keyframe.world_from_keyframe.inverse());
+        Some(Revision {
+            index: self.last_index,
+            world_from_camera,
+            world_from_mid: motion.reference_from_mid,
+            blur: self.blur_length(&seen),
+        })
+    }
+
+    /// About how far a motion (translation, rotation) moves the picture.
+    fn way_in_pixels(&self, way: &Vector6<f64>) -> f64 {
+        let rho = typical_inverse_depth(self.keyframe.finest_keypoints());
+        let (shift, turn) = (way.fixed_rows::<3>(0).norm() * rho, way.fixed_rows::<3>(3).norm());
+        self.config.camera.fx * crate::math::sqrt(shift * shift + turn * turn)
     }
 
     /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
@@ -566,11 +674,12 @@ impl<'m> Tracker<'m> {
     }
 
     /// Holds the last good pose.
-    fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned) -> FrameResult {
+    fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned, doubt: Doubt) -> FrameResult {
         let held = Motion { between_frames: motion.between_frames * 0.5, within_exposure: None, ..*motion };
         self.motion = Some(held);
         let world_from_camera = ExposureTrajectory::still(motion.reference_from_mid);
         let mut result = FrameResult::of(self.frames, frame.timestamp, world_from_camera, &aligned.outcome);
+        result.doubt = Some(doubt);
         result.reference_index = self.keyframe.frame_index;
         result
     }

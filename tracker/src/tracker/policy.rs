@@ -34,11 +34,18 @@ pub(super) struct Typical {
 impl Typical {
     /// Takes in a good frame.
     pub(super) fn learn(&mut self, outcome: &LevelOutcome) {
+        if outcome.photometric_scale < COPY {
+            return;
+        }
         let share = if self.residual == 0.0 { 1.0 } else { 0.2 };
         self.residual += share * (outcome.photometric_scale - self.residual);
         self.depth_residual += share * (outcome.depth_scale - self.depth_residual);
     }
 }
+
+/// Photometric residual of a frame that is a copy of its reference, nominal standard deviations: it tells nothing about
+/// how well others can fit.
+const COPY: f32 = 0.06;
 
 /// Speeds beyond which a hand-held or flying camera's pose is a mistake.
 const MAX_SPEED: f64 = 8.0;

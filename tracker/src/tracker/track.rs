@@ -16,9 +16,9 @@ use super::result::{Doubt, FrameResult, FrameStatus, Revision};
 use crate::align::{AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, ReferenceData, blur_length};
 use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
-use crate::geometry::RigidTransform;
+use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::GreyPyramid;
-use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch, typical_inverse_depth};
+use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch, max_keypoints, typical_inverse_depth};
 use crate::photometric::LuminanceTable;
 use crate::surface::InverseDepthMap;
 use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
@@ -231,7 +231,10 @@ impl<'m> Tracker<'m> {
         let nothing = LevelOutcome::unchanged(Estimate::linear(still));
         let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.promote(&origin, None, f32::MAX);
-        let enough = self.keyframe.finest_keypoints().len() >= MIN_START_KEYPOINTS;
+        let PinholeCamera { width, height, .. } = self.config.camera;
+        // Small images have fewer cells than that; a third of them must show something.
+        let needed = MIN_START_KEYPOINTS.min(max_keypoints(width, height, 0) / 3);
+        let enough = self.keyframe.finest_keypoints().len() >= needed;
         let in_range = self.keyframe.depth.mean().is_some_and(|rho| START_INVERSE_DEPTH.contains(&rho));
         result.doubt = Some(Doubt::NoStart);
         if enough && in_range && self.depth_share >= MIN_START_DEPTH {

@@ -167,6 +167,7 @@ pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
         colour: ColourView::new(&image.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,
         depth: DepthView::new(&image.depth, width, height, width)?,
         angular_velocity: None,
+        gyro: None,
     })
 }
 

@@ -2,6 +2,7 @@
 
 use nalgebra::Vector6;
 
+use super::frame::GyroReading;
 use crate::align::{FollowsCentre, MotionPrior};
 use crate::geometry::{PinholeCamera, RigidTransform};
 
@@ -36,6 +37,14 @@ const BOW_FLOOR: f64 = 4.0;
 /// Accelerations of a violently shaken hand, m/s^2 and rad/s^2.
 const MAX_ACCELERATION: f64 = 100.0;
 const MAX_ANGULAR_ACCELERATION: f64 = 500.0;
+
+/// Standard deviations of a gyroscope's rate: what is left of its bias and noise, rad/s, and a share of the rate for its
+/// scale and its time.
+const GYRO_SIGMA: f64 = 0.05;
+const GYRO_SCALE_SIGMA: f64 = 0.05;
+
+/// Share of the parabola that samples of a gyroscope at both ends leave open.
+const GYRO_BOW_SHARE: f64 = 0.3;
 
 /// How far the motion within an exposure may correct the velocity that the mid poses around it give, as a share of the
 /// change of the mean velocity between them.
@@ -132,10 +141,29 @@ impl Motion {
             bow_information: information(&bow_spread, BOW_FLOOR),
             follows: (dt <= MAX_GAP).then_some(FollowsCentre {
                 keyframe_from_mid: *reference_from_mid,
-                motion: motion_follows,
-                bow: bow_follows,
+                motion: [motion_follows; 2],
+                bow: [bow_follows; 2],
             }),
         }
+    }
+
+    /// The belief of [`Self::expected_motion`] with the turning as a gyroscope measured it, without its bias: that owes
+    /// nothing to the picture, so it does not follow the mid pose.
+    pub(super) fn with_gyro(mut prior: MotionPrior, gyro: &GyroReading, span: f64) -> MotionPrior {
+        let turn = gyro.angular_velocity * span;
+        let bow = gyro.angular_acceleration * (0.5 * span * span);
+        let sigma = GYRO_SIGMA * span + GYRO_SCALE_SIGMA * turn.norm();
+        let bow_sigma = GYRO_BOW_SHARE * bow.norm() + GYRO_SIGMA * span;
+        for i in 0..3 {
+            prior.expected[3 + i] = turn[i];
+            prior.information[3 + i] = 1.0 / (sigma * sigma);
+            prior.bow[3 + i] = bow[i];
+            prior.bow_information[3 + i] = 1.0 / (bow_sigma * bow_sigma);
+        }
+        if let Some(follows) = &mut prior.follows {
+            (follows.motion[1], follows.bow[1]) = (0.0, 0.0);
+        }
+        prior
     }
 
     /// Velocity at the last frame, given the mean rate from it to the next, `dt` seconds later, and what its own exposure

@@ -15,6 +15,6 @@ mod track;
 pub use config::{
     Effort, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len,
 };
-pub use frame::{Frame, ReferenceView};
+pub use frame::{Frame, GyroReading, ReferenceView};
 pub use result::{Doubt, FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

@@ -3,11 +3,11 @@
 use core::mem;
 
 use fearless_simd::Level;
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 
 use super::coarse_to_fine::{Aligned, FrameTask, score};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
-use super::frame::Frame;
+use super::frame::{Frame, GyroReading};
 use super::history::{Motion, rotated};
 use super::keyframe_path::{PathError, PathRate};
 use super::policy::{Evidence, Typical, fits_badly, is_blind, judge, wants_keyframe};
@@ -32,6 +32,9 @@ const MIN_STRENGTH: f32 = 0.02;
 /// Fewest keypoints on the finest level, and least share of measured depth, to start from.
 const MIN_START_KEYPOINTS: usize = 24;
 const MIN_START_DEPTH: f32 = 0.1;
+
+/// Share of a frame in the running mean of the gyroscope's bias: it changes over minutes.
+const GYRO_BIAS_SHARE: f64 = 0.05;
 
 /// Inverse depth, 1/m, that a first frame can have on average: 5 cm to 100 m.
 const START_INVERSE_DEPTH: core::ops::Range<f32> = 0.01..20.0;
@@ -87,6 +90,11 @@ pub struct Tracker<'m> {
     span: f64,
     /// Seconds that the path of the keyframe's frame spans.
     keyframe_span: f64,
+    /// What the gyroscope said while the keyframe was exposed.
+    keyframe_gyro: Option<GyroReading>,
+    gyro: Option<GyroReading>,
+    /// What the gyroscope says of a camera at rest, rad/s: the running mean of its difference to the poses.
+    gyro_bias: Vector3<f64>,
     /// Running number of the last frame that was aligned, and what the next one taught about it.
     last_index: usize,
     late_revision: Option<Revision>,
@@ -148,6 +156,9 @@ impl<'m> Tracker<'m> {
             timing: FrameTiming::GLOBAL,
             span: 0.0,
             keyframe_span: 0.0,
+            keyframe_gyro: None,
+            gyro: None,
+            gyro_bias: Vector3::zeros(),
             last_index: 0,
             late_revision: None,
             established: false,
@@ -173,6 +184,7 @@ impl<'m> Tracker<'m> {
         self.pyramid.fill(&frame.colour, &self.luminance);
         self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
         (self.timing, self.span) = self.config.readout.timing(frame);
+        self.gyro = frame.gyro;
         let blind = self.pyramid.levels.last().is_some_and(|coarsest| is_blind(coarsest.pixels));
         let mut result = match self.motion {
             Some(motion) if blind => self.hold(frame, &motion, &self.nothing(&motion), Doubt::Blind),
@@ -386,7 +398,12 @@ impl<'m> Tracker<'m> {
             let keyframe_from_mid = of_frame.outcome.estimate.keyframe_from_camera.mid();
             let mid_from_keyframe = keyframe_from_mid.inverse();
             self.exchange_with_keyframe(of_frame.outcome.estimate.path().seen_from(&mid_from_keyframe));
-            let back = Frame { timestamp: motion.timestamp, ..*frame };
+            let back = Frame {
+                timestamp: motion.timestamp,
+                angular_velocity: None,
+                gyro: self.keyframe_gyro,
+                ..*frame
+            };
             let from_frame = Motion::still(frame.timestamp, RigidTransform::identity());
             let world_from_frame = self.keyframe.world_from_keyframe.compose(&keyframe_from_mid);
             let world_from_keyframe =
@@ -463,7 +480,10 @@ impl<'m> Tracker<'m> {
             motion: world_motion.seen_from(&self.keyframe.world_from_keyframe.inverse()),
             timestamp: frame.timestamp,
             span: self.span,
-            gyro: frame.angular_velocity,
+            gyro: frame.angular_velocity.map(|rate| rate - self.gyro_bias),
+            turning: frame
+                .gyro
+                .map(|gyro| GyroReading { angular_velocity: gyro.angular_velocity - self.gyro_bias, ..gyro }),
             brightness: self.brightness,
             blur,
             inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),
@@ -530,6 +550,14 @@ impl<'m> Tracker<'m> {
         self.brightness = outcome.estimate.brightness;
         self.late_revision = self.revise_last(frame, motion, &world_from_mid);
         self.last_index = self.frames;
+        if let Some(rate) = frame.angular_velocity
+            && status == FrameStatus::Ok
+        {
+            let seen =
+                motion.reference_from_mid.tangent_to(&world_from_mid) / (frame.timestamp - motion.timestamp);
+            let difference = rate - Vector3::from(seen.fixed_rows::<3>(3));
+            self.gyro_bias += (difference - self.gyro_bias) * GYRO_BIAS_SHARE;
+        }
         let correction = self.observe_path_error(frame, motion, &world_from_mid);
         if status == FrameStatus::Ok {
             self.typical.learn(outcome);
@@ -734,6 +762,7 @@ impl<'m> Tracker<'m> {
         self.keyframe.keyframe_from_camera = keyframe_from_camera;
         self.keyframe.timing = self.timing;
         self.keyframe_span = self.span;
+        self.keyframe_gyro = self.gyro;
         self.path_error = PathError::unknown(&self.path_sigma(KEYFRAME_SHEAR, self.span));
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;

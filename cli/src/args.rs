@@ -94,7 +94,9 @@ pub struct Demo {
 #[command(after_help = "\
 A data set is a folder in the layout of the TUM RGB-D benchmark: rgb.txt and depth.txt (or associations.txt), \
 the images, calibration.toml (not needed for freiburg1 to 3) and, optionally, groundtruth.txt, \
-groundtruth_exposure.txt and exposures.csv.
+groundtruth_exposure.txt, exposures.csv and the recording of an IMU: imu.csv, imu0/data.csv (EuRoC) or \
+accelerometer.txt (TUM). What is printed says of exposure, readout, response and fall-off whether they are \
+recorded or assumed.
 
 Example:
   mba info rgbd_dataset_freiburg1_rpy")]

@@ -29,6 +29,7 @@ mod prefetch;
 mod prepared;
 mod query;
 #[cfg(test)]
+mod ray_views;
 mod reference;
 mod region;
 mod render;

@@ -170,12 +170,14 @@ pub(super) fn store_weighted(parts: &[RowPart<'_>], grid: &TileGrid, rows: &mut 
                 if weight == 0.0 {
                     continue;
                 }
-                for pixel in row * BLOCK_WIDTH..(row + 1) * BLOCK_WIDTH {
-                    let behind = pixels.transmittance[pixel].abs();
-                    for (channel, background) in background.iter().enumerate() {
-                        planes[channel][pixel] +=
-                            weight * (pixels.colour[channel][pixel] + behind * background);
-                    }
+                let in_row = row * BLOCK_WIDTH..(row + 1) * BLOCK_WIDTH;
+                let behind = &pixels.transmittance[in_row.clone()];
+                for (channel, background) in background.iter().enumerate() {
+                    let colours = pixels.colour[channel][in_row.clone()].iter().zip(behind);
+                    let sums = planes[channel][in_row.clone()].iter_mut();
+                    sums.zip(colours).for_each(|(sum, (colour, behind))| {
+                        *sum += weight * (colour + behind.abs() * background);
+                    });
                 }
             }
             if *geometry {

@@ -28,8 +28,8 @@ mod planes;
 mod prefetch;
 mod prepared;
 mod query;
-#[cfg(test)]
 mod ray_views;
+#[cfg(test)]
 mod reference;
 mod region;
 mod render;

@@ -6,6 +6,7 @@ mod eval_images;
 mod keyframes;
 mod map;
 mod mesh;
+mod real_camera;
 mod render;
 mod slam;
 

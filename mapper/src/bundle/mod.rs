@@ -19,6 +19,7 @@ mod moving;
 mod observation;
 mod path_metric;
 mod path_step;
+mod rectified;
 mod schedule;
 mod seeding;
 mod smooth_depth;

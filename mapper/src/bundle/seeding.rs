@@ -155,10 +155,11 @@ impl Squares<'_> {
         let mut depths = Vec::with_capacity((right - left) * (bottom - top));
         for pixel in pixels {
             let bytes = self.seen.colour.each_ref().map(|plane| plane[pixel]);
+            let through = self.seen.falloff.as_ref().map_or(1.0, |falloff| falloff[pixel]);
             light
                 .iter_mut()
                 .zip(bytes)
-                .for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte));
+                .for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte) / through);
             let grey = bytes.iter().map(|&byte| f32::from(byte)).sum::<f32>() / (3.0 * 255.0);
             (sum, squares, count) = (sum + grey, squares + grey * grey, count + 1.0);
             if self.depth[pixel] > 0.0 {
@@ -194,6 +195,7 @@ mod tests {
     use mba_tracker::image::PixelRectangle;
 
     use super::*;
+    use crate::exposure::RowTimes;
 
     /// A grey wall at 2 m with a striped square, and a hole in its depth.
     fn observation() -> Observation {
@@ -206,6 +208,8 @@ mod tests {
             colour: [plane.clone(), plane.clone(), plane],
             depth: pixels().map(|(x, y)| if x >= 48 && y >= 32 { 0.0 } else { 2.0 }).collect(),
             region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+            times: RowTimes::GLOBAL,
+            falloff: None,
         }
     }
 

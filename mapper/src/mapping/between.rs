@@ -43,12 +43,11 @@ pub(super) fn all_exposures(
     let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
     let sensor = sensor(dataset);
     let mut all = Vec::with_capacity(dataset.len());
-    for (index, tracked) in frames.exposures.iter().enumerate() {
-        let timestamp = tracked.timestamp;
+    for index in 0..frames.exposures.len() {
         let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
         if keyframes[next] == index {
             let state = &bundle.state.frames[next];
-            all.push((state.path.timed(timestamp), state.log_gain));
+            all.push((frames.exposure_of(index, state), state.log_gain));
             continue;
         }
         let nearest = nearest(&keyframes, next, index);
@@ -68,7 +67,7 @@ pub(super) fn all_exposures(
             );
             bundle.fit_frame(&unmapped, &mut state, STEPS);
         }
-        all.push((state.path.timed(timestamp), state.log_gain));
+        all.push((frames.exposure_of(index, &state), state.log_gain));
     }
     all
 }

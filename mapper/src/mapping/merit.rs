@@ -104,7 +104,8 @@ fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[Ti
     let map_from_truth = alignment.reference_from_estimate.inverse();
     let calibration = dataset.calibration();
     let (camera, response) = (calibration.camera, calibration.response.inverse());
-    let mut renderer = ViewRenderer::new(&bundle.state.map, camera, &response, calibration.depth_scale);
+    let mut renderer = ViewRenderer::new(&bundle.state.map, camera, &response, calibration.depth_scale)
+        .through(bundle.sensor().falloff.clone());
     for (index, pose) in poses.iter().enumerate() {
         let Some(truth) = read(&folder.join(format!("{index:06}.png"))) else { continue };
         let view = renderer.render(&map_from_truth.compose(&pose.world_from_camera), Behind::Surroundings);

@@ -35,7 +35,9 @@ pub(super) fn write(
     writer.write_map(&bundle.state.map)?;
     let (camera, response) = (dataset.calibration().camera, dataset.calibration().response.inverse());
     let depth_scale = dataset.calibration().depth_scale;
-    let renderer = || ViewRenderer::new(&bundle.state.map, camera, &response, depth_scale);
+    let falloff = bundle.sensor().falloff.clone();
+    let renderer =
+        || ViewRenderer::new(&bundle.state.map, camera, &response, depth_scale).through(falloff.clone());
     let pairs: Vec<_> = bundle.keyframes().iter().zip(&bundle.state.frames).collect();
     let write = |renderer: &mut ViewRenderer<'_>, (keyframe, frame): (&Keyframe, &FrameState)| {
         let colour = &keyframe.observation.level(0).colour;

@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use super::backward::{SplatSums, TileGradient, backward};
 use super::bin::Bins;
 use super::forward::{TileCounts, TilePixels, TileSplats, composite};
-use super::image::{RasterImage, TileRows, ViewTiles, load_gradient, store_mean};
+use super::image::{RasterImage, RowPart, TileRows, ViewTiles, load_gradient, store_mean, store_weighted};
 use super::lanes::ViewNumbers;
 use super::order::{NO_RANK, Order};
 use super::pose::ViewGradient;
 use super::project::{Projected, project};
 use super::project_backward::{GradientRange, SplatGradients, ViewSums, project_backward};
-use super::tile::TileGrid;
+use super::tile::{TILE_HEIGHT, TileGrid};
 use super::view::RasterView;
 use crate::gaussians::{Gaussians, PARAMETERS};
 
@@ -33,6 +33,8 @@ pub struct Rasterizer {
 #[derive(Debug, Default)]
 pub struct RasterScratch {
     view: ViewNumbers,
+    /// Columns and rows of the image, of which the view may have a band only.
+    size: [usize; 2],
     background: [f32; 3],
     projected: Vec<Projected>,
     order: Order,
@@ -48,16 +50,45 @@ pub(crate) struct PoseSums(Vec<ViewSums>);
 
 /// How the gradient by an image is that by one of the views that it shows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ViewShare {
+pub(crate) struct ViewShare<'a> {
     /// Weight of the view in the colour of the image.
-    pub(crate) colour: f32,
+    pub(crate) colour: ColourShare<'a>,
     /// Whether depth and alpha of the image are those of the view; else they do not depend on it.
     pub(crate) geometry: bool,
 }
 
-impl ViewShare {
+/// Weight of a view in the colour of an image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ColourShare<'a> {
+    /// The same for all rows.
+    Same(f32),
+    /// One for every row of the image.
+    Rows(&'a [f32]),
+}
+
+impl ColourShare<'_> {
+    /// The weight in a row of the image.
+    pub(super) fn of_row(self, row: usize) -> f32 {
+        match self {
+            Self::Same(weight) => weight,
+            Self::Rows(weights) => weights[row],
+        }
+    }
+}
+
+impl ViewShare<'_> {
     /// The image is the view.
-    const WHOLE: Self = Self { colour: 1.0, geometry: true };
+    const WHOLE: Self = Self { colour: ColourShare::Same(1.0), geometry: true };
+}
+
+/// What a view of some rows of tiles gives to an image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BandView<'a> {
+    pub(crate) scratch: &'a RasterScratch,
+    /// Its weight in the colour of every row of the image; empty if it has none.
+    pub(crate) weights: &'a [f32],
+    /// Whether depth and alpha of its rows are those of the image.
+    pub(crate) geometry: bool,
 }
 
 /// Gradients of a loss by Gaussians, summed over views.
@@ -106,8 +137,7 @@ impl RasterScratch {
         image: &RasterImage,
         gradients: &GaussianGradients,
     ) -> bool {
-        let grid = self.bins.grid;
-        let same_image = (image.width, image.height) == (grid.width, grid.height);
+        let same_image = [image.width, image.height] == self.size;
         same_image && gaussians.len() == self.projected.len() && gradients.screen.len() == gaussians.len()
     }
 
@@ -158,9 +188,34 @@ impl Rasterizer {
         geometry: bool,
         scratch: &mut RasterScratch,
     ) {
-        self.project(gaussians, view, scratch);
+        let grid = TileGrid::new(view.camera.width, view.camera.height);
+        self.render_grid(gaussians, view, &grid, geometry, scratch);
+    }
+
+    /// [`Self::render`] for the rows of tiles in `band` only.
+    pub(crate) fn render_band(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        band: &Range<usize>,
+        geometry: bool,
+        scratch: &mut RasterScratch,
+    ) {
+        let grid = TileGrid::new(view.camera.width, view.camera.height).band(band);
+        self.render_grid(gaussians, view, &grid, geometry, scratch);
+    }
+
+    fn render_grid(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        grid: &TileGrid,
+        geometry: bool,
+        scratch: &mut RasterScratch,
+    ) {
+        self.project_grid(gaussians, view, grid, scratch);
         self.order(scratch);
-        self.bin(view, scratch);
+        self.bin_grid(grid, scratch);
         if geometry {
             self.composite_tiles::<true>(scratch);
         } else {
@@ -207,7 +262,19 @@ impl Rasterizer {
 
     /// First stage of [`Self::forward`]: projects every Gaussian.
     pub fn project(&self, gaussians: &Gaussians, view: &RasterView, scratch: &mut RasterScratch) {
-        scratch.view = ViewNumbers::new(view);
+        let grid = TileGrid::new(view.camera.width, view.camera.height);
+        self.project_grid(gaussians, view, &grid, scratch);
+    }
+
+    fn project_grid(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        grid: &TileGrid,
+        scratch: &mut RasterScratch,
+    ) {
+        scratch.view = ViewNumbers::new(view).within(grid);
+        scratch.size = [view.camera.width, view.camera.height];
         scratch.background = view.background.map(|channel| channel as f32);
         scratch.projected.resize(gaussians.len(), Projected::default());
         let planes = slices(gaussians);
@@ -226,11 +293,14 @@ impl Rasterizer {
 
     /// Third stage of [`Self::forward`]: lists the splats of every tile.
     pub fn bin(&self, view: &RasterView, scratch: &mut RasterScratch) {
+        self.bin_grid(&TileGrid::new(view.camera.width, view.camera.height), scratch);
+    }
+
+    fn bin_grid(&self, grid: &TileGrid, scratch: &mut RasterScratch) {
         let RasterScratch { bins, order, .. } = scratch;
-        let grid = TileGrid::new(view.camera.width, view.camera.height);
-        bins.reset(grid, order.len());
+        bins.reset(*grid, order.len());
         let chunks = bins.chunks_mut().par_iter_mut().enumerate();
-        chunks.for_each(|(chunk, entries)| entries.fill(&grid, order, chunk));
+        chunks.for_each(|(chunk, entries)| entries.fill(grid, order, chunk));
         bins.gather();
     }
 
@@ -253,6 +323,15 @@ impl Rasterizer {
         store_rows(views, 0..grid.down, image.tile_rows());
     }
 
+    /// The weighted sum of the colours of views of an image of `size` columns and rows, with depth and alpha of the
+    /// view that has them for each row of tiles.
+    pub(crate) fn store_bands(&self, size: [usize; 2], views: &[BandView<'_>], image: &mut RasterImage) {
+        let [width, height] = size;
+        image.resize(width, height);
+        let grid = TileGrid::new(width, height);
+        store_band_rows(views, &grid, 0..grid.down, image.tile_rows());
+    }
+
     fn composite_tiles<const DEPTH: bool>(&self, scratch: &mut RasterScratch) {
         let RasterScratch { bins, order, tiles, .. } = scratch;
         tiles.resize(bins.grid.len(), TilePixels::default());
@@ -268,7 +347,12 @@ impl Rasterizer {
     }
 
     /// [`Self::replay`] for an image of which the view has a share.
-    pub(crate) fn replay_share(&self, by_image: &RasterImage, share: ViewShare, scratch: &mut RasterScratch) {
+    pub(crate) fn replay_share(
+        &self,
+        by_image: &RasterImage,
+        share: ViewShare<'_>,
+        scratch: &mut RasterScratch,
+    ) {
         let mut sums = core::mem::take(&mut scratch.sums);
         sums.resize(scratch.bins.entries.len(), [0.0; 12]);
         let input = Replay { by_image, share, scratch };
@@ -355,7 +439,7 @@ impl Rasterizer {
 /// What replaying a view needs.
 struct Replay<'a> {
     by_image: &'a RasterImage,
-    share: ViewShare,
+    share: ViewShare<'a>,
     scratch: &'a RasterScratch,
 }
 
@@ -376,6 +460,33 @@ fn store_rows(views: &[RasterScratch], down: Range<usize>, mut rows: TileRows) {
         let tiles =
             |view: usize| ViewTiles { tiles: &views[view].tiles, background: &views[view].background };
         store_mean(&tiles, views.len(), &views[0].bins.grid, down.start, &mut rows);
+    }
+}
+
+/// Stores the weighted sum of views in rows of tiles.
+fn store_band_rows(views: &[BandView<'_>], grid: &TileGrid, down: Range<usize>, mut rows: TileRows) {
+    if down.len() > 1 {
+        let middle = down.start + down.len() / 2;
+        let (upper, lower) = rows.split_at(middle - down.start);
+        rayon::join(
+            || store_band_rows(views, grid, down.start..middle, upper),
+            || store_band_rows(views, grid, middle..down.end, lower),
+        );
+    } else if !down.is_empty() {
+        let parts: Vec<RowPart<'_>> = views.iter().filter_map(|view| view.part(grid, down.start)).collect();
+        store_weighted(&parts, grid, &mut rows);
+    }
+}
+
+impl<'a> BandView<'a> {
+    /// What the view gives to row `down` of the tiles of the image, if it has that row.
+    fn part(&self, grid: &TileGrid, down: usize) -> Option<RowPart<'a>> {
+        let RasterScratch { bins, tiles, background, .. } = self.scratch;
+        let row = down.checked_sub(bins.grid.above).filter(|row| *row < bins.grid.down)?;
+        let top = down * TILE_HEIGHT;
+        let weights = core::array::from_fn(|row| self.weights.get(top + row).copied().unwrap_or(0.0));
+        let tiles = &tiles[row * grid.across..(row + 1) * grid.across];
+        Some(RowPart { tiles, background, weights, geometry: self.geometry })
     }
 }
 

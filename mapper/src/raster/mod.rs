@@ -26,7 +26,8 @@ pub mod reference;
 mod tile;
 mod view;
 
+pub(crate) use driver::{BandView, ColourShare, PoseSums, ViewShare};
 pub use driver::{GaussianGradients, RasterScratch, Rasterizer};
-pub(crate) use driver::{PoseSums, ViewShare};
 pub use image::RasterImage;
+pub(crate) use tile::TILE_HEIGHT;
 pub use view::RasterView;

@@ -2,6 +2,7 @@
 
 use mba_tracker::SimdLevel;
 use mba_tracker::geometry::RigidTransform;
+use mba_tracker::trajectory::ExposureTrajectory;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
@@ -11,6 +12,7 @@ use crate::bundle::{
     BundleAdjustment, DepthSource, FrameState, Keyframe, ObservationPyramid, PathPrior, Schedule, Sensor,
 };
 use crate::dataset::RgbdFrame;
+use crate::evaluation::motion_of;
 use crate::exposure::ExposurePath;
 use crate::trajectory_file::TimedExposure;
 
@@ -74,7 +76,7 @@ impl GrowingMap {
             return false;
         }
         let Some(observation) = ObservationPyramid::new(&self.sensor, image, LEVELS) else { return false };
-        let path = ExposurePath::through(exposure);
+        let path = self.path_over(exposure, image.exposure_seconds, image.depth_timestamp - image.timestamp);
         let path = if self.settings.blur { path } else { ExposurePath::still(path.mid()) };
         let prior = PathPrior { middle: path.ends.mid(), motion: None };
         let mut state = FrameState::new(path);
@@ -90,11 +92,18 @@ impl GrowingMap {
         true
     }
 
+    /// The path over all the time in which anything of a frame was measured.
+    fn path_over(&self, exposure: &TimedExposure, seconds: f64, depth_offset: f64) -> ExposurePath {
+        let (_, stretch) = self.sensor.times(seconds, depth_offset);
+        long_path(exposure, stretch)
+    }
+
     /// Takes a better estimate of a frame that may be a keyframe.
     pub(super) fn revise(&mut self, index: usize, exposure: &TimedExposure) {
         let known = self.bundle.keyframes().iter().position(|keyframe| keyframe.index == index);
         if let Some(k) = known.filter(|_| self.settings.blur) {
-            self.bundle.state.frames[k].path = ExposurePath::through(exposure);
+            let exposure_share = self.bundle.keyframes()[k].observation.level(0).times.exposure;
+            self.bundle.state.frames[k].path = long_path(exposure, 1.0 / exposure_share);
         }
     }
 
@@ -153,4 +162,14 @@ impl GrowingMap {
         let any = (u64::from(self.random.next_u32()) * near.len() as u64) >> 32;
         near.get(any as usize).map_or(local, |near| near.keyframe)
     }
+}
+
+/// The path over `stretch` times the exposure. Over a longer time than the exposure it is straight: what a bow adds grows
+/// with the square of time.
+fn long_path(exposure: &TimedExposure, stretch: f64) -> ExposurePath {
+    if stretch == 1.0 {
+        return ExposurePath::through(exposure);
+    }
+    let motion = motion_of(exposure).motion() * stretch;
+    ExposurePath::linear(ExposureTrajectory::from_mid_and_motion(&exposure.mid, &motion))
 }

@@ -65,8 +65,9 @@ impl SecondLook {
         depth_scale: f64,
     ) -> SharpView {
         let image = keyframe.observation.level(0).frame(keyframe.index, depth_scale);
-        let deblurred = self.deblurrer.deblur(&image, &state.path.timed(0.0), &mut self.deblur_memory);
+        let exposure = state.path.stretched(keyframe.observation.level(0).times.exposure).timed(0.0);
+        let deblurred = self.deblurrer.deblur(&image, &exposure, &mut self.deblur_memory);
         let rgb = deblurred.map_or_else(|_| image.rgb.clone(), |deblurred| deblurred.rgb);
-        SharpView { rgb, depth: image.depth, world_from_camera: state.path.ends.mid(), start_from: None }
+        SharpView { rgb, depth: image.depth, world_from_camera: exposure.mid, start_from: None }
     }
 }

@@ -28,6 +28,7 @@ pub mod image_folders;
 pub mod infill;
 pub mod losses;
 pub mod mapping;
+pub mod output;
 pub mod places;
 mod ply;
 mod png;

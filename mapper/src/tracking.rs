@@ -1,5 +1,6 @@
 //! Tracking a whole data set into a RUN folder.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use mba_tracker::error::{ConfigError, FrameError as TrackError};
@@ -38,6 +39,9 @@ pub enum TrackingError {
     /// The data set's camera cannot be tracked with.
     #[error("the tracker cannot use this camera: {0}")]
     Camera(ConfigError),
+    /// Whoever watches asked for it; the folder is up to date.
+    #[error("stopped on request")]
+    Stopped,
     /// The results cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -58,7 +62,8 @@ pub fn tracker_config(dataset: &Dataset, options: &TrackingOptions) -> TrackerCo
     config
 }
 
-/// Tracks every frame of `dataset` in order and pushes it to `run`; `observe` is called after each with its record.
+/// Tracks every frame of `dataset` in order and pushes it to `run`; `observe` is called after each with its record
+/// and says whether to go on.
 ///
 /// A frame that cannot be read or used is skipped: it keeps the pose before it, counts as lost, and `run` gets a
 /// warning that says why. Nothing here depends on threads; the times are of the tracker alone, without reading images.
@@ -69,7 +74,7 @@ pub fn track_dataset(
     dataset: &Dataset,
     options: &TrackingOptions,
     run: &mut RunWriter,
-    mut observe: impl FnMut(&FrameRecord),
+    mut observe: impl FnMut(&FrameRecord) -> ControlFlow<()>,
 ) -> Result<(), TrackingError> {
     let config = tracker_config(dataset, options);
     config.validate().map_err(TrackingError::Camera)?;
@@ -97,7 +102,10 @@ pub fn track_dataset(
                 record
             }
         };
-        observe(&record);
+        if observe(&record).is_break() {
+            run.flush()?;
+            return Err(TrackingError::Stopped);
+        }
     }
     Ok(())
 }

@@ -11,7 +11,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
-use crate::whole_file::write_whole;
+use crate::whole_file::write_text;
 
 /// How far the length of a quaternion in a file may be from 1; what is accepted is normalised.
 ///
@@ -87,7 +87,7 @@ pub fn read_exposures(path: &Path) -> Result<Vec<TimedExposure>, FileError> {
 ///
 /// [`FileError::Unwritable`].
 pub fn write_trajectory(path: &Path, poses: &[TimedPose]) -> Result<(), FileError> {
-    write_whole(path, &format_trajectory(poses))
+    write_text(path, &format_trajectory(poses))
 }
 
 /// The text of [`write_trajectory`].
@@ -107,7 +107,7 @@ pub(crate) fn format_trajectory(poses: &[TimedPose]) -> String {
 ///
 /// [`FileError::Unwritable`].
 pub fn write_exposures(path: &Path, exposures: &[TimedExposure]) -> Result<(), FileError> {
-    write_whole(path, &format_exposures(exposures))
+    write_text(path, &format_exposures(exposures))
 }
 
 /// The text of [`write_exposures`].

@@ -31,6 +31,9 @@ pub struct Map {
     /// RUN folder that is written
     #[arg(long, value_name = "RUN2")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
     /// Go on from the checkpoint in RUN2, if there is one
     #[arg(long)]
     pub resume: bool,

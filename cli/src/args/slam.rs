@@ -27,6 +27,9 @@ pub struct Slam {
     /// RUN folder to write; an earlier run in it is replaced
     #[arg(long, value_name = "RUN")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
     /// How it is done.
     #[command(flatten)]
     pub slamming: Slamming,

@@ -9,10 +9,11 @@ use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
 use super::open;
-use super::written_run::{self, OUT_HINT, absolute, announce, name, or_auto};
+use super::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
-use crate::failure::{OrBadInput, is_disk_full};
+use crate::failure::{OrBadInput, interrupted, is_disk_full};
+use crate::interrupt;
 use crate::report::table;
 
 /// Steps of the progress bar: positions are shares, not counts.
@@ -25,11 +26,11 @@ const PROGRESS_STEPS: usize = 1000;
 pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let run = open::run(&args.trajectory)?;
-    let summary = map_into(&dataset, &run, &args.out, &args.mapping, args.resume, console)?;
+    let summary = map_into(&dataset, &run, &args.out, args.force, &args.mapping, args.resume, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Maps `dataset` from the poses of `run` into the RUN folder `out`.
+/// Maps `dataset` from the poses of `run` into the RUN folder `out`; with `force` also into a folder of others.
 ///
 /// # Errors
 /// As [`run`].
@@ -37,18 +38,26 @@ pub fn map_into(
     dataset: &Dataset,
     run: &Run,
     out: &Path,
+    force: bool,
     args: &Mapping,
     resume: bool,
     console: &Console,
 ) -> anyhow::Result<Summary> {
+    interrupt::watch();
     let settings = MapSettings::from(args);
+    let folder = claim(out, force, &[dataset.folder(), &run.folder])?;
     let progress = console.progress(PROGRESS_STEPS, "mapping");
     let observe = |at: MapProgress| {
         progress.set_position((at.position * PROGRESS_STEPS as f64) as u64);
         progress.set_message(format!("mapping: {}, loss {:.4}, {:.1} dB", at.size, at.loss, at.psnr));
+        interrupt::flow()
     };
-    let mapped = map_dataset(dataset, run, &settings, out, resume, describe(dataset, run, args), observe);
+    let mapped = map_dataset(dataset, run, &settings, folder, resume, describe(dataset, run, args), observe);
     progress.finish_and_clear();
+    if let Err(MapError::Stopped) = mapped {
+        let message = format!("stopped; {} holds the tracked poses and a checkpoint", out.display());
+        return Err(interrupted(message, format!("`{}` goes on", interrupt::command_to_go_on(true))));
+    }
     let summary = mapped.or_else(advise)?;
     announce(&summary, out, console);
     Ok(summary)

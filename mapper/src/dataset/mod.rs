@@ -67,6 +67,12 @@ pub fn open(folder: &Path) -> Result<Dataset, DatasetError> {
     open_with(folder, &OpenOptions::default())
 }
 
+/// Whether `folder` looks like a data set: it has the lists or folders by which a layout is recognised.
+#[must_use]
+pub fn is_data_set(folder: &Path) -> bool {
+    tum::recognise(folder) || replica::recognise(folder) || scannet::recognise(folder)
+}
+
 /// As [`open`], with options.
 ///
 /// # Errors

@@ -1,5 +1,6 @@
 //! From a map that has grown frame by frame to a finished RUN folder.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::between::Fit;
@@ -55,7 +56,7 @@ impl<'a> Finish<'a> {
         mut bundle: BundleAdjustment,
         writer: RunWriter,
         started: Instant,
-        mut observe: impl FnMut(MapProgress),
+        mut observe: impl FnMut(MapProgress) -> ControlFlow<()>,
         more: impl FnOnce(&mut Summary),
     ) -> Result<Summary, MapError> {
         let budget = self.settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));

@@ -29,6 +29,7 @@ pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
 pub use map::{MapFileError, StoredMap};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
+pub(crate) use reader::is_run;
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 

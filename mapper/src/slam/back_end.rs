@@ -1,10 +1,12 @@
 //! The mapper's side of the loop.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::RigidTransform;
 
+use super::SlamError;
 use super::driver::SlamProgress;
 use super::growing_map::GrowingMap;
 use super::loops::Loops;
@@ -59,12 +61,12 @@ impl BackEnd {
         }
     }
 
-    /// Works until the tracker has no more frames.
+    /// Works until the tracker has no more frames, or `observe` asks for an end.
     pub(super) fn run(
         &mut self,
         link: MapperLink,
-        observe: &mut impl FnMut(SlamProgress),
-    ) -> Result<(), RunError> {
+        observe: &mut impl FnMut(SlamProgress) -> ControlFlow<()>,
+    ) -> Result<(), SlamError> {
         let MapperLink { frames, instructions } = link;
         let is_live = self.settings.arrival == Arrival::RealTime;
         let (mut next, mut flushed) = (None, Instant::now());
@@ -90,12 +92,16 @@ impl BackEnd {
                 self.writer.flush()?;
                 flushed = Instant::now();
             }
-            observe(SlamProgress::Frames {
+            let flow = observe(SlamProgress::Frames {
                 frames: self.writer.exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),
                 map: self.map.bundle.state.map.size(),
                 loops: self.loops.closed(),
             });
+            if flow.is_break() {
+                self.writer.flush()?;
+                return Err(SlamError::Stopped);
+            }
         }
         Ok(())
     }

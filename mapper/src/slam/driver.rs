@@ -1,6 +1,6 @@
 //! The run from start to end.
 
-use std::path::Path;
+use std::ops::ControlFlow;
 use std::thread;
 use std::time::Instant;
 
@@ -11,6 +11,7 @@ use super::{SlamError, front_end};
 use crate::bundle::MapSize;
 use crate::dataset::Dataset;
 use crate::mapping::{Finish, MapError, MapProgress};
+use crate::output::OutputFolder;
 use crate::run::{RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
 use crate::tracking::{TrackingError, tracker_config};
 
@@ -38,16 +39,16 @@ pub enum SlamProgress {
 }
 
 /// Tracks and maps `dataset` at the same time into the RUN folder `out`. `describe` becomes the settings of the run;
-/// `observe` is called after every frame and every step of the refinement.
+/// `observe` is called after every frame and every step of the refinement, and says whether to go on.
 ///
 /// # Errors
-/// See [`SlamError`]. What was done before stays in `out`.
+/// See [`SlamError`]. What was done before stays in `out`, and an earlier run until two frames were found.
 pub fn run_slam(
     dataset: &Dataset,
     settings: &SlamSettings,
-    out: &Path,
+    out: OutputFolder,
     describe: RunSettings,
-    mut observe: impl FnMut(SlamProgress),
+    mut observe: impl FnMut(SlamProgress) -> ControlFlow<()>,
 ) -> Result<Summary, SlamError> {
     let started = Instant::now();
     let config = tracker_config(dataset, &settings.tracking());
@@ -77,16 +78,20 @@ pub fn run_slam(
         ..figures
     };
     // A run that is stopped from here on has a map, and poses to evaluate.
+    writer.replace_earlier()?;
     writer.write_map(&bundle.state.map)?;
     writer.flush()?;
     let mapping = settings.mapping();
     let finish = Finish::new(dataset, &mut bundle, writer.exposures(), writer.frames(), &mapping)?;
     let observe = |progress: MapProgress| {
-        observe(SlamProgress::Refinement { position: progress.position, psnr: progress.psnr });
+        observe(SlamProgress::Refinement { position: progress.position, psnr: progress.psnr })
     };
-    let summary = finish.run(bundle, writer, started, observe, |summary| {
+    let finished = finish.run(bundle, writer, started, observe, |summary| {
         let frames_per_second = frames / started.elapsed().as_secs_f64();
         summary.slam = Some(SlamFigures { frames_per_second, ..figures });
-    })?;
-    Ok(summary)
+    });
+    finished.map_err(|error| match error {
+        MapError::Stopped => SlamError::Stopped,
+        other => other.into(),
+    })
 }

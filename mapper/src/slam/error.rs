@@ -14,6 +14,9 @@ pub enum SlamError {
     /// There is no map.
     #[error(transparent)]
     Map(#[from] MapError),
+    /// Whoever watches asked for it; the folder is up to date.
+    #[error("stopped on request")]
+    Stopped,
     /// The results cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),

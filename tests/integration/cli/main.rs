@@ -3,9 +3,12 @@
 mod bad_input;
 mod commands;
 mod eval_images;
+#[cfg(unix)]
+mod interrupts;
 mod keyframes;
 mod map;
 mod mesh;
+mod outputs;
 mod render;
 mod slam;
 

@@ -14,7 +14,7 @@ use crate::whole_file::read;
 ///
 /// If the file cannot be read or is not a file of Gaussians.
 pub fn read_ply(path: &Path) -> Result<Gaussians, PlyError> {
-    parse_ply(path, &read(path)?)
+    parse_ply(path, &read(path, crate::ply::MAGIC)?)
 }
 
 /// The Gaussians of a file with the content `bytes`; `path` only names it in errors.

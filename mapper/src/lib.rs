@@ -25,6 +25,7 @@ pub mod evaluation;
 pub mod exposure;
 pub mod gaussians;
 pub mod image_folders;
+pub mod imu;
 pub mod infill;
 pub mod losses;
 pub mod mapping;

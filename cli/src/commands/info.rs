@@ -156,7 +156,7 @@ fn response_name(calibration: &Calibration) -> &'static str {
 fn readout_name(readout: Readout) -> &'static str {
     match readout {
         Readout::Global => "global",
-        Readout::Rolling => "rolling",
+        Readout::Rolling { .. } => "rolling",
     }
 }
 

@@ -37,6 +37,7 @@ impl Observation {
         RgbdFrame {
             index,
             timestamp: 0.0,
+            depth_timestamp: 0.0,
             exposure_seconds: 0.0,
             width: self.camera.width,
             height: self.camera.height,

@@ -2,6 +2,10 @@
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use mba_tracker::photometric::InverseResponse;
+use nalgebra::{Matrix3, Rotation3};
+
+use super::knowledge::{CalibrationSources, Knowledge};
+use super::vignetting::Vignetting;
 
 /// Everything known about the camera of a data set.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,21 +22,34 @@ pub struct Calibration {
     pub frame_rate: f64,
     /// How the stored values follow from light.
     pub response: Response,
-    /// How the sensor is read out.
+    /// How the colour sensor is read out.
     pub readout: Readout,
+    /// Time from the exposure of the first row of depth to that of the last, seconds; negative when the last row
+    /// comes first, 0 when all are measured together.
+    pub depth_readout_seconds: f64,
+    /// When depth is measured: its time minus that of the colour image, seconds. Without it, depth images keep
+    /// the timestamps they have.
+    pub depth_delay_seconds: Option<f64>,
+    /// How light falls off towards the corners of the stored colour images.
+    pub vignetting: Vignetting,
+    /// Takes vectors in the camera's axes to those of the IMU. Without it the usual axes of the IMU's file hold
+    /// (see [`crate::imu`]).
+    pub imu_from_camera: Option<Rotation3<f64>>,
+    /// How each of these facts came to be known.
+    pub sources: CalibrationSources,
 }
 
 /// Where the exposure times come from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ExposureSource {
-    /// One recorded exposure time for all frames.
+    /// One exposure time for all frames.
     Constant {
         /// Seconds, positive.
         seconds: f64,
     },
-    /// A recorded exposure time for each frame.
+    /// An exposure time for each frame.
     PerFrame,
-    /// Not recorded: [`ASSUMED_EXPOSURE_SHARE`] of the frame interval.
+    /// Not recorded: [`assumed_exposure_seconds`].
     Assumed {
         /// Seconds, positive.
         seconds: f64,
@@ -44,6 +61,19 @@ pub enum ExposureSource {
 /// A shutter cannot be open for longer than the whole interval. Consumer depth cameras in rooms come near that
 /// in the evening and to a fifth of it in daylight; half is wrong by a factor of about two at most either way.
 pub const ASSUMED_EXPOSURE_SHARE: f64 = 0.5;
+
+/// Longest exposure time that is assumed, seconds.
+///
+/// Frames that are half a second apart were picked from a video or taken by hand, and neither says that the shutter
+/// was open for longer than a video camera's can be.
+pub const LONGEST_ASSUMED_EXPOSURE: f64 = 1.0 / 30.0;
+
+/// The exposure time in seconds that is assumed at this frame rate (per second):
+/// [`ASSUMED_EXPOSURE_SHARE`] of the frame interval, at most [`LONGEST_ASSUMED_EXPOSURE`].
+#[must_use]
+pub fn assumed_exposure_seconds(frame_rate: f64) -> f64 {
+    (ASSUMED_EXPOSURE_SHARE / frame_rate).min(LONGEST_ASSUMED_EXPOSURE)
+}
 
 /// How the stored 8-bit values follow from light.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,13 +98,29 @@ impl Response {
     }
 }
 
-/// How the sensor is read out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How a sensor is read out.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Readout {
     /// All rows are exposed at the same time.
     Global,
-    /// Rows are exposed one after the other.
-    Rolling,
+    /// Rows are exposed one after the other; the timestamp is that of the middle of the image.
+    Rolling {
+        /// Time from the exposure of the first row to that of the last; negative when the last row comes first.
+        /// Unknown where it is not on record.
+        seconds: Option<f64>,
+    },
+}
+
+impl Readout {
+    /// Time from the exposure of the first row to that of the last, seconds, 0 for a global shutter; none for rows
+    /// that are exposed one after the other in an unknown time.
+    #[must_use]
+    pub fn readout_seconds(self) -> Option<f64> {
+        match self {
+            Self::Global => Some(0.0),
+            Self::Rolling { seconds } => seconds,
+        }
+    }
 }
 
 /// A value outside its valid range.
@@ -95,12 +141,64 @@ const MAX_FOCAL_IN_WIDTHS: f64 = 100.0;
 /// Largest plausible image side in pixels, so that absurd sizes do not ask for absurd memory.
 const MAX_SIDE: usize = 16_384;
 
+/// Longest readout of a sensor, seconds either way: three times that of slow telephones.
+const MAX_READOUT: f64 = 0.1;
+
+/// Longest time between a colour image and its depth image, seconds either way.
+const MAX_DEPTH_DELAY: f64 = 0.2;
+
+/// Exposure times that a video camera can have, seconds.
+const EXPOSURES: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
+
 impl Calibration {
+    /// A camera of which nothing is known but its geometry, depth scale and frame rate: exposure and response are
+    /// assumed, the shutter is taken for global, and nothing falls off or comes late.
+    pub(super) fn of_geometry(
+        camera: PinholeCamera,
+        distortion: Distortion,
+        depth_scale: f64,
+        frame_rate: f64,
+    ) -> Self {
+        Self {
+            camera,
+            distortion,
+            depth_scale,
+            exposure: ExposureSource::Assumed { seconds: assumed_exposure_seconds(frame_rate) },
+            frame_rate,
+            response: Response::Srgb,
+            readout: Readout::Global,
+            depth_readout_seconds: 0.0,
+            depth_delay_seconds: None,
+            vignetting: Vignetting::NONE,
+            imu_from_camera: None,
+            sources: CalibrationSources::GEOMETRY_ONLY,
+        }
+    }
+
+    /// The same camera with a rolling shutter that is on record without its time.
+    pub(super) fn rolling(mut self) -> Self {
+        self.readout = Readout::Rolling { seconds: None };
+        self.sources.readout = Knowledge::Recorded;
+        self
+    }
+
     /// Exposure time of a frame that has none of its own, seconds.
     pub(super) fn fallback_exposure_seconds(&self) -> f64 {
         match self.exposure {
             ExposureSource::Constant { seconds } | ExposureSource::Assumed { seconds } => seconds,
-            ExposureSource::PerFrame => ASSUMED_EXPOSURE_SHARE / self.frame_rate,
+            ExposureSource::PerFrame => assumed_exposure_seconds(self.frame_rate),
+        }
+    }
+
+    /// Settles where exposure times come from, once it is known whether there is one for each frame.
+    pub(super) fn settle_exposure(&mut self, is_listed: bool) {
+        if is_listed {
+            self.exposure = ExposureSource::PerFrame;
+            if self.sources.exposure == Knowledge::Assumed {
+                self.sources.exposure = Knowledge::Recorded;
+            }
+        } else if let ExposureSource::Assumed { .. } = self.exposure {
+            self.sources.exposure = Knowledge::Assumed;
         }
     }
 
@@ -113,13 +211,90 @@ impl Calibration {
         }
         check_positive("depth_scale", self.depth_scale, "a positive number of raw units per metre")?;
         check_positive("frame_rate", self.frame_rate, "a positive number of frames per second")?;
-        match self.exposure {
-            ExposureSource::Constant { seconds } | ExposureSource::Assumed { seconds } => {
-                check_positive("exposure_seconds", seconds, "a positive number of seconds")
+        if let ExposureSource::Constant { seconds } | ExposureSource::Assumed { seconds } = self.exposure {
+            check_exposure(seconds)?;
+        }
+        self.check_times()?;
+        self.check_optics()
+    }
+
+    /// Checks readout and delay.
+    fn check_times(&self) -> Result<(), InvalidValue> {
+        let readouts = [
+            ("readout_seconds", self.readout.readout_seconds().unwrap_or(0.0)),
+            ("depth_readout_seconds", self.depth_readout_seconds),
+        ];
+        for (key, seconds) in readouts {
+            if !(-MAX_READOUT..=MAX_READOUT).contains(&seconds) {
+                return Err(invalid(key, seconds, "seconds from the first row to the last, -0.1 to 0.1"));
             }
-            ExposureSource::PerFrame => Ok(()),
+        }
+        match self.depth_delay_seconds {
+            Some(seconds) if !(-MAX_DEPTH_DELAY..=MAX_DEPTH_DELAY).contains(&seconds) => {
+                Err(invalid("depth_delay_seconds", seconds, "seconds from colour to depth, -0.2 to 0.2"))
+            }
+            _ => Ok(()),
         }
     }
+
+    /// Checks fall-off and the axes of the IMU.
+    fn check_optics(&self) -> Result<(), InvalidValue> {
+        let Vignetting { a2, a4 } = self.vignetting;
+        if !(a2.is_finite() && a4.is_finite() && self.vignetting.least() > 0.0) {
+            return Err(InvalidValue {
+                key: "vignetting",
+                value: format!("[{a2}, {a4}]"),
+                expected: "[a2, a4] with 1 + a2 r^2 + a4 r^4 above 0 for r from 0 to 1",
+            });
+        }
+        match self.imu_from_camera {
+            Some(rotation) if !is_rotation(&rotation) => {
+                let value = format!("{:?}", rotation.matrix().transpose().as_slice());
+                Err(InvalidValue { key: "imu_from_camera", value, expected: ROTATION })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// What the nine numbers of a rotation must be.
+pub(super) const ROTATION: &str =
+    "the 9 numbers of a rotation, row by row, columns orthogonal and of length 1";
+
+/// Largest element of `R R^T - I` of a rotation that is kept as it is.
+const ROUNDING: f64 = 1e-12;
+
+/// Whether the matrix is finite, orthonormal to rounding and right-handed.
+fn is_rotation(rotation: &Rotation3<f64>) -> bool {
+    let matrix = rotation.matrix();
+    let deviation = matrix * matrix.transpose() - Matrix3::identity();
+    // Written so that NaN is refused.
+    deviation.iter().all(|element| element.abs() <= ROUNDING) && matrix.determinant() > 0.0
+}
+
+/// The rotation of nine numbers, row by row, that may be rounded to two decimals; none if they are no rotation.
+pub(super) fn rotation_of(rows: &[f64; 9]) -> Option<Rotation3<f64>> {
+    let exact = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(rows));
+    if is_rotation(&exact) {
+        return Some(exact);
+    }
+    let matrix = exact.matrix();
+    let deviation = matrix * matrix.transpose() - Matrix3::identity();
+    let is_near = deviation.iter().all(|element| element.abs() <= 0.02) && matrix.determinant() > 0.0;
+    if !is_near {
+        return None;
+    }
+    // The nearest rotation: the singular values, all near 1, become 1.
+    let parts = matrix.svd(true, true);
+    Some(Rotation3::from_matrix_unchecked(parts.u? * parts.v_t?))
+}
+
+/// Checks an exposure time.
+pub(super) fn check_exposure(seconds: f64) -> Result<(), InvalidValue> {
+    if EXPOSURES.contains(&seconds) {
+        return Ok(());
+    }
+    Err(invalid("exposure_seconds", seconds, "a positive number of seconds, 0.000001 to 1 (16 ms are 0.016)"))
 }
 
 /// Checks size, focal lengths and principal point.

@@ -4,13 +4,14 @@ use std::ops::Range;
 use std::path::Path;
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
-use mba_tracker::photometric::InverseResponse;
+use nalgebra::Rotation3;
 use serde::Deserialize;
 
-use super::calibration::{ASSUMED_EXPOSURE_SHARE, InvalidValue};
-use super::{Calibration, DatasetError, ExposureSource, Readout, Response, Warning};
-use crate::FileError;
-use crate::text_lines::TextFile;
+use super::calibration::{InvalidValue, ROTATION, rotation_of};
+use super::{
+    Calibration, CalibrationSources, CameraFact, DatasetError, ExposureSource, Knowledge, Readout, Response,
+    Vignetting, Warning, response_table,
+};
 use crate::whole_file::read_text;
 
 /// Name of the file.
@@ -32,6 +33,12 @@ struct Keys {
     frame_rate: Option<f64>,
     response: Option<String>,
     readout: Option<ReadoutKey>,
+    readout_seconds: Option<f64>,
+    depth_readout_seconds: Option<f64>,
+    depth_delay_seconds: Option<f64>,
+    vignetting: Option<[f64; 2]>,
+    imu_from_camera: Option<RotationKey>,
+    estimated: Option<Vec<CameraFact>>,
 }
 
 #[derive(Deserialize)]
@@ -41,11 +48,19 @@ enum ReadoutKey {
     Rolling,
 }
 
+/// Nine numbers, or three rows of three.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "imu_from_camera must be 9 numbers or three rows of 3")]
+enum RotationKey {
+    Rows([[f64; 3]; 3]),
+    Flat([f64; 9]),
+}
+
 /// Reads the file at `path`. `measured_rate` (frames per second, from the timestamps) stands in for a missing
 /// `frame_rate`; whatever is assumed is added to `warnings`.
 ///
-/// `response` is `"srgb"`, `"linear"` or the name of a `.csv` or `.txt` file beside the calibration with 256
-/// increasing numbers: the linear light of each code, in any unit.
+/// `response` is `"srgb"`, `"linear"` or the name of a `.csv` or `.txt` file beside the calibration (see
+/// [`response_table`]). A list of exposure times is not looked for: see [`Calibration::settle_exposure`].
 pub(super) fn read(
     path: &Path,
     measured_rate: Option<f64>,
@@ -83,29 +98,86 @@ fn calibration(
     measured_rate: Option<f64>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Calibration, DatasetError> {
-    let Keys { width, height, fx, fy, cx, cy, .. } = keys;
+    let located = |invalid| invalid_value(path, text, invalid);
+    let camera = PinholeCamera {
+        width: keys.width,
+        height: keys.height,
+        fx: keys.fx,
+        fy: keys.fy,
+        cx: keys.cx,
+        cy: keys.cy,
+    };
     let [k1, k2, p1, p2, k3] = keys.distortion.unwrap_or_default();
+    let lens = Distortion { k1, k2, p1, p2, k3 };
     let frame_rate = keys.frame_rate.unwrap_or_else(|| assumed_rate(measured_rate, warnings));
-    let exposure = match keys.exposure_seconds {
-        Some(seconds) => ExposureSource::Constant { seconds },
-        None => ExposureSource::Assumed { seconds: ASSUMED_EXPOSURE_SHARE / frame_rate },
+    let mut calibration = Calibration::of_geometry(camera, lens, keys.depth_scale, frame_rate);
+    calibration.sources = sources(&keys).map_err(located)?;
+    if let Some(seconds) = keys.exposure_seconds {
+        calibration.exposure = ExposureSource::Constant { seconds };
+    }
+    calibration.readout = readout(&keys, warnings).map_err(located)?;
+    calibration.response = response(path, text, keys.response, warnings)?;
+    calibration.depth_readout_seconds = keys.depth_readout_seconds.unwrap_or(0.0);
+    calibration.depth_delay_seconds = keys.depth_delay_seconds;
+    calibration.vignetting = keys.vignetting.map_or(Vignetting::NONE, |[a2, a4]| Vignetting { a2, a4 });
+    calibration.imu_from_camera = keys.imu_from_camera.map(rotation).transpose().map_err(located)?;
+    Ok(calibration)
+}
+
+/// What is on record, and what the file says was estimated.
+fn sources(keys: &Keys) -> Result<CalibrationSources, InvalidValue> {
+    let estimated = keys.estimated.as_deref().unwrap_or_default();
+    let of = |fact: CameraFact, is_given: bool| match (estimated.contains(&fact), is_given) {
+        (true, true) => Ok(Knowledge::Estimated),
+        // The times of the frames may stand in their own list.
+        (true, false) if fact == CameraFact::Exposure => Ok(Knowledge::Estimated),
+        (true, false) => Err(InvalidValue {
+            key: "estimated",
+            value: format!("\"{}\"", fact.name()),
+            expected: "names of facts that have a value in this file",
+        }),
+        (false, true) => Ok(Knowledge::Recorded),
+        (false, false) => Ok(Knowledge::Assumed),
     };
-    let readout = match keys.readout {
-        Some(ReadoutKey::Global) => Readout::Global,
-        Some(ReadoutKey::Rolling) => Readout::Rolling,
-        None => {
+    Ok(CalibrationSources {
+        camera: of(CameraFact::Camera, true)?,
+        depth_scale: of(CameraFact::DepthScale, true)?,
+        exposure: of(CameraFact::Exposure, keys.exposure_seconds.is_some())?,
+        readout: of(CameraFact::Readout, keys.readout.is_some() || keys.readout_seconds.is_some())?,
+        response: of(CameraFact::Response, keys.response.is_some())?,
+        vignetting: of(CameraFact::Vignetting, keys.vignetting.is_some())?,
+        depth_delay: of(CameraFact::DepthDelay, keys.depth_delay_seconds.is_some())?,
+    })
+}
+
+/// The readout of two keys that must not contradict each other; a time alone says that rows are exposed one after
+/// the other.
+fn readout(keys: &Keys, warnings: &mut Vec<Warning>) -> Result<Readout, InvalidValue> {
+    match (&keys.readout, keys.readout_seconds) {
+        (Some(ReadoutKey::Rolling), seconds) => Ok(Readout::Rolling { seconds }),
+        (Some(ReadoutKey::Global), Some(seconds)) if seconds != 0.0 => Err(InvalidValue {
+            key: "readout_seconds",
+            value: seconds.to_string(),
+            expected: "0 or nothing with readout = \"global\"",
+        }),
+        (Some(ReadoutKey::Global), _) | (None, Some(0.0)) => Ok(Readout::Global),
+        (None, Some(seconds)) => Ok(Readout::Rolling { seconds: Some(seconds) }),
+        (None, None) => {
             warnings.push(Warning::Assumed { key: "readout", value: "\"global\"".into() });
-            Readout::Global
+            Ok(Readout::Global)
         }
+    }
+}
+
+fn rotation(key: RotationKey) -> Result<Rotation3<f64>, InvalidValue> {
+    let rows = match key {
+        RotationKey::Flat(rows) => rows,
+        RotationKey::Rows(rows) => std::array::from_fn(|index| rows[index / 3][index % 3]),
     };
-    Ok(Calibration {
-        camera: PinholeCamera { width, height, fx, fy, cx, cy },
-        distortion: Distortion { k1, k2, p1, p2, k3 },
-        depth_scale: keys.depth_scale,
-        exposure,
-        frame_rate,
-        response: response(path, text, keys.response, warnings)?,
-        readout,
+    rotation_of(&rows).ok_or_else(|| InvalidValue {
+        key: "imu_from_camera",
+        value: format!("{rows:?}"),
+        expected: ROTATION,
     })
 }
 
@@ -128,7 +200,7 @@ fn response(
         Some("srgb") => Ok(Response::Srgb),
         Some("linear") => Ok(Response::Linear),
         Some(file) if file.ends_with(".csv") || file.ends_with(".txt") => {
-            Ok(read_response_table(&path.with_file_name(file))?)
+            Ok(Response::Table(Box::new(response_table::read(&path.with_file_name(file))?)))
         }
         Some(other) => Err(invalid_value(
             path,
@@ -144,32 +216,6 @@ fn response(
             Ok(Response::Srgb)
         }
     }
-}
-
-/// Reads 256 increasing numbers, separated by white space, commas or line ends, and scales the last to 1.
-fn read_response_table(path: &Path) -> Result<Response, FileError> {
-    const EXPECTED: &str = "256 increasing numbers, not negative: the linear light of the codes 0 to 255";
-    let file = TextFile::read(path)?;
-    let mut values: Vec<f32> = Vec::with_capacity(256);
-    let mut last_line = 1;
-    for line in file.lines() {
-        for field in line.fields() {
-            let value = line.number(field, EXPECTED)? as f32;
-            let increases = values.last().is_none_or(|previous| value > *previous);
-            if !increases || value < 0.0 || values.len() == 256 {
-                return Err(line.malformed(EXPECTED));
-            }
-            values.push(value);
-        }
-        last_line = line.number;
-    }
-    let table = values.as_slice().try_into().ok().and_then(InverseResponse::from_table);
-    table.map(|table| Response::Table(Box::new(table))).ok_or_else(|| FileError::MalformedLine {
-        path: path.to_owned(),
-        line: last_line,
-        found: format!("{} numbers", values.len()),
-        expected: EXPECTED,
-    })
 }
 
 /// Line, from 1, in which `span` begins.

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use super::InvalidValue;
 use crate::FileError;
 
 /// The data set cannot be used.
@@ -55,6 +56,17 @@ pub enum DatasetError {
         value: String,
         /// Its valid range.
         expected: &'static str,
+    },
+    /// A calibration that did not come from a file has an absurd value.
+    #[error("the calibration is not valid: {0}")]
+    InvalidCalibration(#[from] InvalidValue),
+    /// There are not as many exposure times as frames.
+    #[error("{found} exposure times for {frames} frames")]
+    ExposureCount {
+        /// Number of exposure times.
+        found: usize,
+        /// Number of frames.
+        frames: usize,
     },
     /// A list has no entries.
     #[error("{path} lists no images")]
@@ -239,6 +251,14 @@ pub enum Warning {
         /// One over the median time between frames, per second.
         measured: f64,
     },
+    /// Timestamps that are far apart and probably in another unit.
+    #[error("frames are {interval} s apart; timestamps are in seconds, these look like {unit}")]
+    TimestampUnit {
+        /// Median time between frames, seconds as read.
+        interval: f64,
+        /// The unit that would make it a video.
+        unit: &'static str,
+    },
     /// Frames are missing in between.
     #[error("{count} gaps between frames, the longest {longest:.3} s after {after}")]
     Gaps {
@@ -263,4 +283,15 @@ pub enum Warning {
         /// The ground truth.
         path: PathBuf,
     },
+    /// The recording of the IMU cannot be read.
+    #[error("{problem}; the IMU is left out")]
+    ImuUnusable {
+        /// What is wrong, with file and line.
+        problem: String,
+    },
+    /// Recording of the IMU and frames share no time.
+    #[error(
+        "the recording of the IMU covers none of the frames' times and is left out; do both use the same clock?"
+    )]
+    ImuElsewhere,
 }

@@ -3,14 +3,17 @@
 use std::path::Path;
 
 use super::association::associate;
+use super::calibration::check_exposure;
 use super::sequence::FrameEntry;
 use super::{Calibration, DatasetError, Warning};
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
+use crate::whole_file::write_whole;
 
 const FILE_NAME: &str = "exposures.csv";
 const HEADER: &str = "a header line with the columns timestamp and exposure_s";
 const ROW: &str = "a row with a timestamp and a positive exposure_s in seconds";
+const PLAUSIBLE: &str = "an exposure_s of 0.000001 to 1 seconds (16 ms are 0.016)";
 
 /// Gives each entry the exposure time of the row closest in time, at most half a frame interval away, or else the
 /// one of the calibration. Returns whether there is such a file.
@@ -75,5 +78,21 @@ fn row(line: &Line<'_>, columns: [usize; 2]) -> Result<[f64; 2], FileError> {
         let field = fields.get(column).ok_or_else(|| line.malformed(ROW))?;
         *value = line.number(field, ROW)?;
     }
-    if values[1] > 0.0 { Ok(values) } else { Err(line.malformed(ROW)) }
+    match values[1] {
+        exposure if exposure <= 0.0 => Err(line.malformed(ROW)),
+        exposure if check_exposure(exposure).is_err() => Err(line.malformed(PLAUSIBLE)),
+        _ => Ok(values),
+    }
+}
+
+/// Writes the exposure times (seconds) of frames with these timestamps, as the data set's list `exposures.csv` has
+/// them; both read back exactly.
+///
+/// # Errors
+///
+/// [`FileError`] if the file cannot be written.
+pub fn write_exposure_times(path: &Path, times_and_exposures: &[(f64, f64)]) -> Result<(), FileError> {
+    let row = |(time, exposure): &(f64, f64)| format!("{time:?},{exposure:?}\n");
+    let rows: String = times_and_exposures.iter().map(row).collect();
+    write_whole(path, &format!("timestamp,exposure_s\n{rows}"))
 }

@@ -13,8 +13,10 @@ use super::FrameError;
 pub struct RgbdFrame {
     /// Index in the data set, from 0.
     pub index: usize,
-    /// Mid exposure, seconds.
+    /// Mid exposure of the middle of the colour image, seconds.
     pub timestamp: f64,
+    /// When depth was measured, seconds on the same clock.
+    pub depth_timestamp: f64,
     /// Time the shutter was open, seconds.
     pub exposure_seconds: f64,
     /// Width in pixels.

@@ -2,7 +2,7 @@
 //!
 //! The native layout is that of the TUM RGB-D benchmark plus a `calibration.toml`; the sequences of that
 //! benchmark, Replica as rendered for NICE-SLAM and ScanNet exports are read as they are. Timestamps are those of
-//! mid exposure; poses are `world_from_camera`.
+//! mid exposure of the middle of the image; depth images have their own. Poses are `world_from_camera`.
 //!
 //! ```no_run
 //! let dataset = mba_mapper::dataset::open(std::path::Path::new("my_sequence"))?;
@@ -18,30 +18,41 @@
 mod association;
 mod calibration;
 mod calibration_file;
+mod calibration_text;
 mod error;
 mod exposure_list;
 mod frame;
+mod knowledge;
 mod known_cameras;
 mod numbered_images;
 mod pose_matrix;
 mod replica;
+mod response_table;
 mod scannet;
 mod sequence;
 mod survey;
 mod tum;
+mod vignetting;
 
 use std::fs;
 use std::path::Path;
 
 use crate::FileError;
 pub use crate::trajectory_file::{TimedExposure, TimedPose};
-pub use calibration::{ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, Readout, Response};
+pub use calibration::{
+    ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Readout,
+    Response, assumed_exposure_seconds,
+};
 pub(crate) use calibration::{check_camera, check_positive};
+pub use calibration_text::write_calibration;
 pub use error::{DatasetError, FrameError, Warning};
+pub use exposure_list::write_exposure_times;
 pub use frame::RgbdFrame;
 pub(crate) use frame::read_image;
+pub use knowledge::{CalibrationSources, CameraFact, Knowledge};
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
+pub use vignetting::Vignetting;
 
 /// How a data set is opened.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,4 +101,15 @@ pub fn open_with(folder: &Path, options: &OpenOptions) -> Result<Dataset, Datase
         return Err(DatasetError::UnknownLayout { folder: folder.to_owned() });
     };
     Dataset::new(folder, contents)
+}
+
+/// Reads a calibration file by itself, without exposure times of its frames.
+///
+/// # Errors
+///
+/// [`DatasetError`] if it is unreadable, malformed or absurd.
+pub fn read_calibration(path: &Path) -> Result<Calibration, DatasetError> {
+    let mut calibration = calibration_file::read(path, None, &mut Vec::new())?;
+    calibration.settle_exposure(false);
+    Ok(calibration)
 }

@@ -72,5 +72,11 @@ fn image_number(path: &Path, prefix: &str) -> Option<usize> {
 }
 
 fn entry(timestamp: f64, colour: &Path, depth: &Path) -> FrameEntry {
-    FrameEntry { timestamp, colour: colour.to_owned(), depth: depth.to_owned(), exposure_seconds: None }
+    FrameEntry {
+        timestamp,
+        depth_timestamp: timestamp,
+        colour: colour.to_owned(),
+        depth: depth.to_owned(),
+        exposure_seconds: None,
+    }
 }

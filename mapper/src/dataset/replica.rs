@@ -7,13 +7,11 @@ use std::path::{Path, PathBuf};
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use serde::Deserialize;
 
-use super::calibration::{ASSUMED_EXPOSURE_SHARE, InvalidValue};
+use super::calibration::InvalidValue;
 use super::numbered_images::{self, ImageFolder};
 use super::pose_matrix::pose_from_rows;
 use super::sequence::{Contents, FrameEntry};
-use super::{
-    Calibration, DatasetError, ExposureSource, Readout, Response, TimedPose, Warning, calibration_file,
-};
+use super::{Calibration, DatasetError, Knowledge, TimedPose, Warning, calibration_file};
 use crate::FileError;
 use crate::text_lines::TextFile;
 use crate::whole_file::read_text;
@@ -50,11 +48,12 @@ pub(super) fn recognise(folder: &Path) -> bool {
 pub(super) fn read(folder: &Path) -> Result<Contents, DatasetError> {
     let mut warnings = Vec::new();
     let own_calibration = folder.join(calibration_file::FILE_NAME);
-    let calibration = if own_calibration.is_file() {
+    let mut calibration = if own_calibration.is_file() {
         calibration_file::read(&own_calibration, None, &mut warnings)?
     } else {
         read_camera(&camera_path(folder))?
     };
+    calibration.settle_exposure(false);
     let images = folder.join(IMAGES);
     let colour = ImageFolder { path: &images, prefix: "frame" };
     let depth = ImageFolder { path: &images, prefix: "depth" };
@@ -91,15 +90,10 @@ fn read_camera(path: &Path) -> Result<Calibration, DatasetError> {
         }
     })?;
     let CameraKeys { w: width, h: height, fx, fy, cx, cy, scale } = camera;
-    let calibration = Calibration {
-        camera: PinholeCamera { width, height, fx, fy, cx, cy },
-        distortion: Distortion::default(),
-        depth_scale: scale,
-        exposure: ExposureSource::Assumed { seconds: ASSUMED_EXPOSURE_SHARE / FRAME_RATE },
-        frame_rate: FRAME_RATE,
-        response: Response::Srgb,
-        readout: Readout::Global,
-    };
+    let camera = PinholeCamera { width, height, fx, fy, cx, cy };
+    let mut calibration = Calibration::of_geometry(camera, Distortion::default(), scale, FRAME_RATE);
+    // The images are rendered.
+    calibration.sources.readout = Knowledge::Recorded;
     let own_key = |invalid: InvalidValue| {
         let key = match invalid.key {
             "width" => "w",

@@ -7,12 +7,12 @@ use std::path::Path;
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 
-use super::calibration::{ASSUMED_EXPOSURE_SHARE, InvalidValue, check_camera};
+use super::calibration::{InvalidValue, check_camera};
 use super::frame::image_size;
 use super::numbered_images::{self, ImageFolder};
 use super::pose_matrix::pose_from_rows;
 use super::sequence::{Contents, FrameEntry};
-use super::{Calibration, DatasetError, ExposureSource, Readout, Response, TimedPose, Warning};
+use super::{Calibration, DatasetError, TimedPose, Warning};
 use crate::FileError;
 use crate::text_lines::TextFile;
 
@@ -45,25 +45,14 @@ pub(super) fn read(folder: &Path) -> Result<Contents, DatasetError> {
     let camera = read_camera(&intrinsics.join("intrinsic_depth.txt"), depth_images)?;
     let ground_truth = read_poses(&poses, &numbered, &mut warnings)?;
     Ok(Contents {
-        calibration: calibration(camera),
+        calibration: Calibration::of_geometry(camera, Distortion::default(), DEPTH_SCALE, FRAME_RATE)
+            .rolling(),
         colour_camera: Some(colour_camera),
         entries: numbered.into_iter().map(|(_, entry)| entry).collect(),
         ground_truth,
         ground_truth_exposures: Vec::new(),
         warnings,
     })
-}
-
-fn calibration(camera: PinholeCamera) -> Calibration {
-    Calibration {
-        camera,
-        distortion: Distortion::default(),
-        depth_scale: DEPTH_SCALE,
-        exposure: ExposureSource::Assumed { seconds: ASSUMED_EXPOSURE_SHARE / FRAME_RATE },
-        frame_rate: FRAME_RATE,
-        response: Response::Srgb,
-        readout: Readout::Rolling,
-    }
 }
 
 /// The camera of a matrix file; its size is that of the first readable image.

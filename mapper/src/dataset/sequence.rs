@@ -7,9 +7,14 @@ use mba_tracker::image::{
     PixelRectangle, SourcePosition, fill_source_map, region_with_source, remap_bilinear, remap_nearest,
 };
 
-use super::calibration::ASSUMED_EXPOSURE_SHARE;
+use super::calibration::{ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, check_exposure};
 use super::frame::{image_size, read_colour, read_depth};
-use super::{Calibration, DatasetError, ExposureSource, FrameError, RgbdFrame, Warning};
+use super::vignetting::falloff_of_pixels;
+use super::{
+    Calibration, CameraFact, DatasetError, ExposureSource, FrameError, InvalidValue, Knowledge, RgbdFrame,
+    Warning,
+};
+use crate::imu::{self, ImuRecording};
 use crate::trajectory_file::{TimedExposure, TimedPose};
 
 /// An RGB-D sequence with calibration and, where recorded, ground truth. Images stay on disk until asked for.
@@ -18,9 +23,14 @@ pub struct Dataset {
     folder: PathBuf,
     name: String,
     calibration: Calibration,
+    /// As in [`Contents`].
+    colour_camera: Option<PinholeCamera>,
     entries: Vec<FrameEntry>,
     ground_truth: Vec<TimedPose>,
     ground_truth_exposures: Vec<TimedExposure>,
+    imu: Option<ImuRecording>,
+    /// Of the reader; those about times follow from calibration and entries.
+    reader_warnings: Vec<Warning>,
     warnings: Vec<Warning>,
     colour: ImageSource,
     depth: ImageSource,
@@ -32,6 +42,8 @@ pub struct Dataset {
 pub(super) struct FrameEntry {
     /// Mid exposure, seconds.
     pub(super) timestamp: f64,
+    /// That of the depth image itself, seconds; that of colour where it has none.
+    pub(super) depth_timestamp: f64,
     pub(super) colour: PathBuf,
     pub(super) depth: PathBuf,
     /// Exposure time recorded for this very frame, seconds.
@@ -62,31 +74,84 @@ impl Dataset {
         let Contents { calibration, colour_camera, entries, ground_truth, ground_truth_exposures, warnings } =
             contents;
         let camera = calibration.camera;
-        let colour_camera = colour_camera.unwrap_or(camera);
+        let captured = colour_camera.unwrap_or(camera);
         // Before the maps: their memory follows from sizes that may be wrong.
-        check_first_size(entries.iter().map(|entry| &entry.colour), size(&colour_camera))?;
+        check_first_size(entries.iter().map(|entry| &entry.colour), size(&captured))?;
         check_first_size(entries.iter().map(|entry| &entry.depth), size(&camera))?;
-        let colour = ImageSource::new(&calibration, &colour_camera);
+        let colour = ImageSource::new(&calibration, &captured);
         let depth = ImageSource::new(&calibration, &camera);
         let whole = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
         let region = colour.map.as_ref().map_or(whole, |map| region_with_source(map, camera.width));
-        let name = folder_name(folder);
-        let folder = folder.to_owned();
         let mut dataset = Self {
-            folder,
-            name,
+            name: folder_name(folder),
+            folder: folder.to_owned(),
             calibration,
+            colour_camera,
             entries,
             ground_truth,
             ground_truth_exposures,
-            warnings,
+            imu: None,
+            reader_warnings: warnings,
+            warnings: Vec::new(),
             colour,
             depth,
             region,
         };
-        dataset.warn_about_timing();
-        dataset.warn_about_missing_images();
+        dataset.collect_warnings();
         Ok(dataset)
+    }
+
+    /// The same recording as another calibration describes it: undistortion, times and the axes of the IMU follow
+    /// from it. Exposure times of single frames are kept if it has them per frame, and dropped otherwise.
+    ///
+    /// # Errors
+    ///
+    /// [`DatasetError::InvalidCalibration`] for absurd values and for an exposure per frame where the frames have
+    /// none, [`DatasetError::SizeMismatch`] if the images have another size.
+    pub fn with_calibration(self, calibration: Calibration) -> Result<Self, DatasetError> {
+        calibration.check()?;
+        let is_per_frame = calibration.exposure == ExposureSource::PerFrame;
+        let mut entries = self.entries;
+        if is_per_frame && entries.iter().any(|entry| entry.exposure_seconds.is_none()) {
+            return Err(DatasetError::InvalidCalibration(InvalidValue {
+                key: "exposure_seconds",
+                value: "per frame".to_owned(),
+                expected: "one number, as there is none for each frame",
+            }));
+        }
+        if !is_per_frame {
+            entries.iter_mut().for_each(|entry| entry.exposure_seconds = None);
+        }
+        let contents = Contents {
+            calibration,
+            colour_camera: self.colour_camera,
+            entries,
+            ground_truth: self.ground_truth,
+            ground_truth_exposures: self.ground_truth_exposures,
+            warnings: self.reader_warnings,
+        };
+        Self::new(&self.folder, contents)
+    }
+
+    /// Replaces the exposure times of all frames by estimates, seconds, one for each frame.
+    ///
+    /// # Errors
+    ///
+    /// [`DatasetError::ExposureCount`], [`DatasetError::InvalidCalibration`] for a time that no shutter has; then
+    /// nothing changes.
+    pub fn set_exposures(&mut self, seconds: Vec<f64>) -> Result<(), DatasetError> {
+        let (found, frames) = (seconds.len(), self.entries.len());
+        if found != frames {
+            return Err(DatasetError::ExposureCount { found, frames });
+        }
+        seconds.iter().try_for_each(|seconds| check_exposure(*seconds))?;
+        for (entry, seconds) in self.entries.iter_mut().zip(seconds) {
+            entry.exposure_seconds = Some(seconds);
+        }
+        self.calibration.exposure = ExposureSource::PerFrame;
+        self.calibration.sources.exposure = Knowledge::Estimated;
+        self.collect_warnings();
+        Ok(())
     }
 
     /// Name of the data set: its folder's name.
@@ -126,7 +191,7 @@ impl Dataset {
         self.region
     }
 
-    /// Mid exposure of frame `index` in seconds, increasing with the index.
+    /// Mid exposure of the middle of frame `index` in seconds, increasing with the index.
     ///
     /// # Panics
     ///
@@ -134,6 +199,17 @@ impl Dataset {
     #[must_use]
     pub fn timestamp(&self, index: usize) -> f64 {
         self.entries[index].timestamp
+    }
+
+    /// When the depth of frame `index` was measured, seconds: by the delay of the calibration, else by the depth
+    /// image's own timestamp, else that of colour.
+    ///
+    /// # Panics
+    ///
+    /// If `index` is not below [`Self::len`].
+    #[must_use]
+    pub fn depth_timestamp(&self, index: usize) -> f64 {
+        self.entry_depth_timestamp(&self.entries[index])
     }
 
     /// Time the shutter was open for frame `index`, seconds: recorded for the frame, else for the camera, else
@@ -163,6 +239,7 @@ impl Dataset {
         Ok(RgbdFrame {
             index,
             timestamp: entry.timestamp,
+            depth_timestamp: self.entry_depth_timestamp(entry),
             exposure_seconds: self.entry_exposure(entry),
             width: self.calibration.camera.width,
             height: self.calibration.camera.height,
@@ -184,6 +261,21 @@ impl Dataset {
         &self.ground_truth_exposures
     }
 
+    /// What the IMU recorded, in the axes of the camera, if there was one and its file is good.
+    #[must_use]
+    pub fn imu(&self) -> Option<&ImuRecording> {
+        self.imu.as_ref()
+    }
+
+    /// The share of light that the lens lets through to each pixel of the frames, row by row, from 0 to about 1;
+    /// none for a lens without fall-off. Undistortion is taken into account: the fall-off is that of the stored image.
+    #[must_use]
+    pub fn light_falloff(&self) -> Option<Vec<f32>> {
+        let Calibration { vignetting, camera, .. } = &self.calibration;
+        let source = self.colour.map.as_deref();
+        (!vignetting.is_none()).then(|| falloff_of_pixels(vignetting, camera, self.colour.size, source))
+    }
+
     /// Whatever is odd about the data set.
     #[must_use]
     pub fn warnings(&self) -> &[Warning] {
@@ -192,6 +284,41 @@ impl Dataset {
 
     fn entry_exposure(&self, entry: &FrameEntry) -> f64 {
         entry.exposure_seconds.unwrap_or(self.calibration.fallback_exposure_seconds())
+    }
+
+    fn entry_depth_timestamp(&self, entry: &FrameEntry) -> f64 {
+        let delayed = |delay| entry.timestamp + delay;
+        self.calibration.depth_delay_seconds.map_or(entry.depth_timestamp, delayed)
+    }
+
+    /// Finds again what is odd, and reads the IMU, whose axes the calibration decides.
+    fn collect_warnings(&mut self) {
+        let sources = self.calibration.sources;
+        let is_still_assumed = |fact: CameraFact| sources.of(fact) == Knowledge::Assumed;
+        let still_holds = |warning: &&Warning| match warning {
+            Warning::Assumed { key: "readout", .. } => is_still_assumed(CameraFact::Readout),
+            Warning::Assumed { key: "response", .. } => is_still_assumed(CameraFact::Response),
+            _ => true,
+        };
+        self.warnings = self.reader_warnings.iter().filter(still_holds).cloned().collect();
+        self.warn_about_timing();
+        self.warn_about_missing_images();
+        self.read_imu();
+    }
+
+    /// A damaged recording of the IMU is odd, but frames can do without.
+    fn read_imu(&mut self) {
+        match imu::read_folder(&self.folder, self.calibration.imu_from_camera.as_ref()) {
+            Ok(imu) => self.imu = imu,
+            Err(error) => self.warnings.push(Warning::ImuUnusable { problem: error.to_string() }),
+        }
+        let (first, last) = (self.entries.first(), self.entries.last());
+        if let (Some(imu), Some(first), Some(last)) = (&self.imu, first, last)
+            && !imu.overlaps(first.timestamp, last.timestamp)
+        {
+            self.warnings.push(Warning::ImuElsewhere);
+            self.imu = None;
+        }
     }
 
     fn warn_about_timing(&mut self) {
@@ -203,9 +330,15 @@ impl Dataset {
         {
             self.warnings.push(Warning::FrameRateDiffers { frame_rate, measured });
         }
+        self.warnings.extend(find_other_unit(&times));
         self.warnings.extend(find_gaps(&times));
         if let ExposureSource::Assumed { seconds } = self.calibration.exposure {
-            let value = format!("{seconds:.4} s ({ASSUMED_EXPOSURE_SHARE} of the frame interval)");
+            let why = if seconds < LONGEST_ASSUMED_EXPOSURE {
+                format!("{ASSUMED_EXPOSURE_SHARE} of the frame interval")
+            } else {
+                "the longest that is assumed".to_owned()
+            };
+            let value = format!("{seconds:.4} s ({why})");
             self.warnings.push(Warning::Assumed { key: "exposure_seconds", value });
         }
         let exposure = self.entries.iter().map(|entry| self.entry_exposure(entry)).fold(0.0, f64::max);
@@ -262,6 +395,19 @@ fn median_interval(times: &[f64]) -> Option<f64> {
     let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     intervals.sort_by(f64::total_cmp);
     intervals.get(intervals.len() / 2).copied()
+}
+
+/// A median interval that is no video's in seconds, but one in another unit.
+fn find_other_unit(times: &[f64]) -> Option<Warning> {
+    // Every hundredth frame of a video is still read without a word.
+    const LONGEST_INTERVAL: f64 = 5.0;
+    let interval = median_interval(times).filter(|interval| *interval > LONGEST_INTERVAL)?;
+    let unit = match interval {
+        ..1e3 => "milliseconds",
+        ..1e6 => "microseconds",
+        _ => "nanoseconds",
+    };
+    Some(Warning::TimestampUnit { interval, unit })
 }
 
 /// Intervals of more than one and a half times the median.

@@ -82,6 +82,7 @@ mod tests {
         let frame = RgbdFrame {
             index: 0,
             timestamp: 0.0,
+            depth_timestamp: 0.0,
             exposure_seconds: 0.01,
             width: 8,
             height: 1,

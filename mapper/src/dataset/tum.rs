@@ -3,13 +3,9 @@
 use std::path::Path;
 
 use super::association::{associate, closest};
-use super::calibration::ASSUMED_EXPOSURE_SHARE;
 use super::known_cameras::{TUM_DEPTH_SCALE, TUM_FRAME_RATE, tum_camera};
 use super::sequence::{Contents, FrameEntry, frames_per_second};
-use super::{
-    Calibration, DatasetError, ExposureSource, OpenOptions, Readout, Response, Warning, calibration_file,
-    exposure_list,
-};
+use super::{Calibration, DatasetError, OpenOptions, Warning, calibration_file, exposure_list};
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
 use crate::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
@@ -41,9 +37,8 @@ pub(super) fn read(folder: &Path, options: &OpenOptions) -> Result<Contents, Dat
         associate_lists(folder, options, &mut warnings)?
     };
     let mut calibration = read_calibration(folder, &entries, &mut warnings)?;
-    if exposure_list::read(folder, &mut entries, &calibration, &mut warnings)? {
-        calibration.exposure = ExposureSource::PerFrame;
-    }
+    let is_listed = exposure_list::read(folder, &mut entries, &calibration, &mut warnings)?;
+    calibration.settle_exposure(is_listed);
     let (ground_truth, ground_truth_exposures) = read_ground_truth(folder, &entries, &mut warnings)?;
     Ok(Contents { calibration, colour_camera: None, entries, ground_truth, ground_truth_exposures, warnings })
 }
@@ -58,17 +53,15 @@ fn read_associations(
 ) -> Result<Vec<FrameEntry>, DatasetError> {
     let file = TextFile::read(path)?;
     let mut entries: Vec<FrameEntry> = Vec::new();
-    let mut depth_times: Vec<f64> = Vec::new();
     for line in file.lines() {
         let (colour, depth) = parse_pair(&line)?;
         line.check_order(colour.timestamp, entries.last().map(|entry| entry.timestamp))?;
-        depth_times.push(depth.timestamp);
         entries.push(entry(folder, &colour, &depth));
     }
     if entries.is_empty() {
         return Err(DatasetError::EmptyList { path: path.to_owned() });
     }
-    warn_about_pairs(path, &entries, &depth_times, options, warnings);
+    warn_about_pairs(path, &entries, options, warnings);
     Ok(entries)
 }
 
@@ -84,15 +77,9 @@ fn parse_pair<'a>(line: &Line<'a>) -> Result<(ListedImage<'a>, ListedImage<'a>),
     if is_depth(&first) && !is_depth(&second) { Ok((second, first)) } else { Ok((first, second)) }
 }
 
-fn warn_about_pairs(
-    path: &Path,
-    entries: &[FrameEntry],
-    depth_times: &[f64],
-    options: &OpenOptions,
-    warnings: &mut Vec<Warning>,
-) {
+fn warn_about_pairs(path: &Path, entries: &[FrameEntry], options: &OpenOptions, warnings: &mut Vec<Warning>) {
     let tolerance = options.association_tolerance;
-    let offsets = entries.iter().zip(depth_times).map(|(entry, depth)| (entry.timestamp - depth).abs());
+    let offsets = entries.iter().map(|entry| (entry.timestamp - entry.depth_timestamp).abs());
     // A microsecond of slack for timestamps that were rounded when written.
     let loose = offsets.filter(|offset| *offset > tolerance + 1e-6);
     let largest = loose.clone().fold(0.0, f64::max);
@@ -100,7 +87,7 @@ fn warn_about_pairs(
     if count > 0 {
         warnings.push(Warning::LoosePairs { list: path.to_owned(), count, tolerance, largest });
     }
-    let mut sorted = depth_times.to_vec();
+    let mut sorted: Vec<f64> = entries.iter().map(|entry| entry.depth_timestamp).collect();
     sorted.sort_by(f64::total_cmp);
     let reused: Vec<f64> = sorted.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect();
     if let Some(&first) = reused.first() {
@@ -166,6 +153,7 @@ fn unmatched(list: &Path, times: &[f64], matched: &[usize], tolerance: f64) -> O
 fn entry(folder: &Path, colour: &ListedImage<'_>, depth: &ListedImage<'_>) -> FrameEntry {
     FrameEntry {
         timestamp: colour.timestamp,
+        depth_timestamp: depth.timestamp,
         colour: folder.join(colour.file),
         depth: folder.join(depth.file),
         exposure_seconds: None,
@@ -187,15 +175,9 @@ fn read_calibration(
     let known = tum_camera(&absolute)
         .ok_or_else(|| DatasetError::MissingCalibration { folder: folder.to_owned() })?;
     warnings.push(Warning::KnownCamera { camera: known.name });
-    Ok(Calibration {
-        camera: known.camera,
-        distortion: known.distortion,
-        depth_scale: TUM_DEPTH_SCALE,
-        exposure: ExposureSource::Assumed { seconds: ASSUMED_EXPOSURE_SHARE / TUM_FRAME_RATE },
-        frame_rate: TUM_FRAME_RATE,
-        response: Response::Srgb,
-        readout: Readout::Rolling,
-    })
+    let calibration =
+        Calibration::of_geometry(known.camera, known.distortion, TUM_DEPTH_SCALE, TUM_FRAME_RATE);
+    Ok(calibration.rolling())
 }
 
 /// Reads `groundtruth.txt` and `groundtruth_exposure.txt` where they exist; the second can stand in for the

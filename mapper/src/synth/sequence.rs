@@ -67,7 +67,8 @@ impl SynthFrame {
     #[must_use]
     pub fn into_captured(self, index: usize) -> RgbdFrame {
         let Self { timestamp, exposure_seconds, width, height, rgb, depth, .. } = self;
-        RgbdFrame { index, timestamp, exposure_seconds, width, height, rgb, depth }
+        let depth_timestamp = timestamp;
+        RgbdFrame { index, timestamp, depth_timestamp, exposure_seconds, width, height, rgb, depth }
     }
 }
 

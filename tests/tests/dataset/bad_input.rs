@@ -104,6 +104,57 @@ fn absurd_calibrations_are_named_with_line_and_value() {
         ("fy = 7.5\n", "", "line 1: missing field `fy`"),
         ("fy = 7.5", "fy = \"a\"", "line 4: invalid type: string \"a\", expected f64"),
         ("fy = 7.5", "fy 7.5", "line 4: "),
+        (
+            "exposure_seconds = 0.016",
+            "exposure_seconds = 16",
+            "line 8: exposure_seconds = 16, expected a positive number of seconds, 0.000001 to 1 (16 ms are 0.016)",
+        ),
+        (
+            "readout = \"global\"",
+            "readout_seconds = 20",
+            "line 11: readout_seconds = 20, expected seconds from the first row to the last, -0.1 to 0.1",
+        ),
+        (
+            "readout = \"global\"",
+            "readout = \"global\"\nreadout_seconds = 0.02",
+            "line 12: readout_seconds = 0.02, expected 0 or nothing with readout = \"global\"",
+        ),
+        (
+            "frame_rate",
+            "depth_readout_seconds = -0.11\nframe_rate",
+            "line 9: depth_readout_seconds = -0.11, expected seconds from the first row to the last",
+        ),
+        (
+            "frame_rate",
+            "depth_delay_seconds = 11\nframe_rate",
+            "line 9: depth_delay_seconds = 11, expected seconds from colour to depth, -0.2 to 0.2",
+        ),
+        (
+            "frame_rate",
+            "vignetting = [-1.5, 0.5]\nframe_rate",
+            "line 9: vignetting = [-1.5, 0.5], expected [a2, a4] with 1 + a2 r^2 + a4 r^4 above 0",
+        ),
+        (
+            "frame_rate",
+            "vignetting = [nan, 0]\nframe_rate",
+            "line 9: vignetting = [NaN, 0], expected [a2, a4]",
+        ),
+        (
+            "frame_rate",
+            "imu_from_camera = [1, 0, 0, 0, 1, 0, 0, 0, -1]\nframe_rate",
+            "line 9: imu_from_camera = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0], expected the 9 numbers",
+        ),
+        (
+            "frame_rate",
+            "imu_from_camera = [1, 0]\nframe_rate",
+            "line 9: imu_from_camera must be 9 numbers or three rows of 3",
+        ),
+        (
+            "frame_rate",
+            "estimated = [\"readout\", \"vignetting\"]\nframe_rate",
+            "line 9: estimated = \"vignetting\", expected names of facts that have a value in this file",
+        ),
+        ("frame_rate", "estimated = [\"weather\"]\nframe_rate", "line 9: unknown variant `weather`"),
         ("\"global\"", "\"sideways\"", "line 11: unknown variant `sideways`, expected `global` or `rolling`"),
     ] {
         let folder = Folder::complete();
@@ -136,6 +187,15 @@ fn odd_timing_is_reported() {
     let times = [0.0, 0.033, 0.066, 0.2, 0.233, 0.266, 1.0, 1.033];
     folder.write("associations.txt", &times.map(line).concat());
     assert_eq!(folder.warnings(), ["2 gaps between frames, the longest 0.734 s after 0.266"]);
+
+    for (factor, unit) in [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")] {
+        folder.write("associations.txt", &[0.0, 0.032, 0.064].map(|time| line(factor * time)).concat());
+        let expected = format!(
+            "frames are {} s apart; timestamps are in seconds, these look like {unit}",
+            0.032 * factor
+        );
+        assert!(folder.warnings().contains(&expected), "{:?}", folder.warnings());
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Data sets: every layout, every message.
 
 mod bad_input;
+mod camera_facts;
 mod folder;
+mod inertial;
 mod other_layouts;
 mod tum_layout;

@@ -134,7 +134,7 @@ fn freiburg_sequences_need_no_calibration() {
         let calibration = dataset.calibration();
         assert_eq!((calibration.camera.fx, calibration.distortion.k1), (fx, k1));
         assert_eq!((calibration.depth_scale, calibration.frame_rate), (5000.0, 30.0));
-        assert_eq!(calibration.readout, Readout::Rolling);
+        assert_eq!(calibration.readout, Readout::Rolling { seconds: None });
         assert!((dataset.exposure_seconds(0) - 0.5 / 30.0).abs() < 1e-12);
         assert_eq!(folder.warnings().len(), 2);
         assert!(folder.warnings()[0].starts_with("no calibration.toml, using the published"));

@@ -25,6 +25,14 @@ pub enum FileError {
         /// What it is, in a word.
         kind: &'static str,
     },
+    /// A text is not in UTF-8.
+    #[error("{path} is in {encoding}, expected UTF-8")]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+        /// What it is in, as far as that is known.
+        encoding: String,
+    },
     /// The file is larger than any that makes sense.
     #[error("cannot read {path}: the file has {bytes} bytes, the most that is read is {limit}")]
     TooLarge {

@@ -23,11 +23,23 @@ pub(crate) fn read(path: &Path, magic: &[u8]) -> Result<Vec<u8>, FileError> {
     if start == magic { read_at_most(path, LARGEST_BINARY) } else { Ok(start) }
 }
 
-/// The content of a text file in UTF-8.
+/// The content of a text file in UTF-8. A mark at its beginning is left out, and lines that end with carriage returns
+/// alone end with line feeds.
 pub(crate) fn read_text(path: &Path) -> Result<String, FileError> {
-    let unreadable = |reason| FileError::Unreadable { path: path.to_owned(), reason };
-    let not_utf8 = |_| unreadable(io::Error::new(io::ErrorKind::InvalidData, "it is not a text in UTF-8"));
-    String::from_utf8(read_at_most(path, LARGEST_TEXT)?).map_err(not_utf8)
+    let encoding = |encoding| FileError::Encoding { path: path.to_owned(), encoding };
+    let mut content = read_at_most(path, LARGEST_TEXT)?;
+    match content.as_slice() {
+        [0xEF, 0xBB, 0xBF, ..] => drop(content.drain(..3)),
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => return Err(encoding("UTF-16".to_owned())),
+        _ => {}
+    }
+    let text = String::from_utf8(content).map_err(|error| {
+        let (at, content) = (error.utf8_error().valid_up_to(), error.as_bytes());
+        let line = 1 + content[..at].iter().filter(|byte| **byte == b'\n').count();
+        encoding(format!("another encoding (byte {:02x} in line {line})", content[at]))
+    })?;
+    let has_old_line_ends = text.contains('\r') && !text.contains('\n');
+    Ok(if has_old_line_ends { text.replace('\r', "\n") } else { text })
 }
 
 /// The content of a file of at most `limit` bytes. What is no file, such as a device or pipe, may have no end and is
@@ -138,6 +150,25 @@ mod tests {
         File::create(&path).unwrap().set_len(LARGEST_TEXT + 1).unwrap();
         assert!(
             matches!(read_text(&path), Err(FileError::TooLarge { bytes, .. }) if bytes == LARGEST_TEXT + 1)
+        );
+    }
+
+    #[test]
+    fn texts_of_other_systems_are_read_or_their_encoding_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("file");
+        let read = |content: &[u8]| {
+            fs::write(&path, content).unwrap();
+            read_text(&path)
+        };
+        assert_eq!(read(b"\xEF\xBB\xBF1 2\r\n3").unwrap(), "1 2\r\n3");
+        assert_eq!(read(b"1 2\r3 4\r").unwrap(), "1 2\n3 4\n");
+        let message = read(b"\xFF\xFE1\x00").unwrap_err().to_string();
+        assert!(message.ends_with("file is in UTF-16, expected UTF-8"), "{message}");
+        let message = read(b"a\nf\xFCr").unwrap_err().to_string();
+        assert!(
+            message.ends_with("file is in another encoding (byte fc in line 2), expected UTF-8"),
+            "{message}"
         );
     }
 

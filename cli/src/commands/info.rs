@@ -15,6 +15,9 @@ use crate::report::table::{pairs, percent};
 /// Frames whose images are read.
 const SAMPLED_FRAMES: usize = 16;
 
+/// Median depths in metres that a depth camera can have seen.
+const PLAUSIBLE_DEPTH: std::ops::RangeInclusive<f64> = 0.1..=30.0;
+
 /// What is printed.
 #[derive(Serialize)]
 struct Facts {
@@ -115,6 +118,9 @@ fn truth_share(dataset: &Dataset, stamps: &[f64]) -> f64 {
 fn warnings(dataset: &Dataset, survey: Survey) -> Vec<String> {
     let mut warnings: Vec<String> = dataset.warnings().iter().map(ToString::to_string).collect();
     warnings.extend(grouped(survey.unreadable, dataset.folder()));
+    if let Some(median) = survey.median_depth.filter(|median| !PLAUSIBLE_DEPTH.contains(median)) {
+        warnings.push(format!("the median depth is {median} m: is depth_scale in raw units per metre?"));
+    }
     if survey.without_depth > 0 {
         let (empty, sampled) = (survey.without_depth, survey.sampled);
         warnings.push(format!("{empty} of {sampled} sampled depth images hold no depth at all"));

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mba_mapper::dataset::Dataset;
+use mba_mapper::dataset::{Dataset, Warning};
 use mba_mapper::mapping::MapError;
 use mba_mapper::run::{RunError, RunSettings, Summary};
 use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
@@ -13,7 +13,7 @@ use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_
 use super::{open, outcome};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
-use crate::failure::{OrBadInput, interrupted, is_disk_full};
+use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
 use crate::interrupt;
 use crate::report::table;
 
@@ -26,6 +26,12 @@ const REFINEMENT_STEPS: u64 = 1000;
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
 pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
+    if args.slamming.realtime
+        && let Some(warning) = dataset.warnings().iter().find(|w| matches!(w, Warning::TimestampUnit { .. }))
+    {
+        let hint = "correct the timestamps, or leave --realtime out";
+        return Err(bad_input(format!("frames cannot come by their times: {warning}"), hint));
+    }
     let summary = slam_into(&dataset, &args.out, args.force, &args.slamming, console)?;
     console.result(&summary, table::summary)
 }

@@ -43,12 +43,12 @@ pub use calibration::{
     ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Readout,
     Response, assumed_exposure_seconds,
 };
-pub(crate) use calibration::{check_camera, check_positive};
+pub(crate) use calibration::{MAX_PIXELS, check_camera, check_positive};
 pub use calibration_text::write_calibration;
 pub use error::{DatasetError, FrameError, Warning};
 pub use exposure_list::write_exposure_times;
 pub use frame::RgbdFrame;
-pub(crate) use frame::read_image;
+pub use frame::read_image;
 pub use knowledge::{CalibrationSources, CameraFact, Knowledge};
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};

@@ -92,6 +92,17 @@ pub fn read_exposures(path: &Path) -> Result<Vec<TimedExposure>, FileError> {
     parsed(&file, EXPOSURE_LINE, exposure_of_line).collect()
 }
 
+/// Whether the first line of numbers of a file is one of exposures, with three poses, rather than one of a trajectory.
+///
+/// # Errors
+///
+/// [`FileError`] if the file is unreadable.
+pub fn has_exposures(path: &Path) -> Result<bool, FileError> {
+    const NUMBERS_PER_EXPOSURE: usize = 22;
+    let file = TextFile::read(path)?;
+    Ok(file.lines().next().is_some_and(|line| line.fields().count() == NUMBERS_PER_EXPOSURE))
+}
+
 /// Writes a TUM trajectory, timestamps with six decimals and poses with nine. The file appears whole or not at
 /// all.
 ///

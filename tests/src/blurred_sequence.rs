@@ -114,7 +114,7 @@ impl BlurredSequence {
     /// When that fails.
     pub fn slam_of(&self, dataset: &Dataset, name: &str, settings: &SlamSettings) -> Summary {
         let (out, go_on) = (self.output(name), |_| ControlFlow::Continue(()));
-        run_slam(dataset, settings, out, self.describe(), go_on).expect("a finished run")
+        run_slam(dataset, settings, out, false, self.describe(), go_on).expect("a finished run")
     }
 
     /// The folder `name` for a run.

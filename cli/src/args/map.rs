@@ -125,7 +125,7 @@ fn default_keyframes() -> NonZeroUsize {
 }
 
 /// A number of seconds, finite and not negative.
-fn seconds(text: &str) -> Result<Duration, String> {
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }

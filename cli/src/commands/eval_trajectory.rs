@@ -1,6 +1,5 @@
 //! `mba eval trajectory`.
 
-use std::fs;
 use std::path::Path;
 
 use mba_mapper::dataset::survey;
@@ -8,7 +7,7 @@ use mba_mapper::evaluation::{
     BlurFigures, TrajectoryError, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
 };
 use mba_mapper::run::mid_pose;
-use mba_mapper::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
+use mba_mapper::trajectory_file::{TimedExposure, TimedPose, has_exposures, read_exposures, read_trajectory};
 use serde::Serialize;
 
 use super::open;
@@ -99,19 +98,10 @@ struct Poses {
 impl Poses {
     fn read(path: &Path) -> anyhow::Result<Self> {
         const HINT: &str = "a TUM trajectory has lines `timestamp tx ty tz qx qy qz qw`";
-        if !has_three_poses(path) {
+        if !has_exposures(path).or_bad_input(HINT)? {
             return Ok(Self { trajectory: read_trajectory(path).or_bad_input(HINT)?, exposures: None });
         }
         let exposures = read_exposures(path).or_bad_input(HINT)?;
         Ok(Self { trajectory: exposures.iter().map(mid_pose).collect(), exposures: Some(exposures) })
     }
-}
-
-/// Whether the first line of numbers is that of an exposures file. A file that cannot be read is left to the reader,
-/// which has the better message.
-fn has_three_poses(path: &Path) -> bool {
-    const NUMBERS_PER_EXPOSURE: usize = 22;
-    let text = fs::read_to_string(path).unwrap_or_default();
-    let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
-    first.is_some_and(|line| line.split_whitespace().count() == NUMBERS_PER_EXPOSURE)
 }

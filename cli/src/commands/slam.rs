@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mba_mapper::checkpoint::CheckpointError;
 use mba_mapper::dataset::{Dataset, Warning};
 use mba_mapper::mapping::MapError;
 use mba_mapper::run::{RunError, RunSettings, Summary};
@@ -32,18 +33,19 @@ pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
         let hint = "correct the timestamps, or leave --realtime out";
         return Err(bad_input(format!("frames cannot come by their times: {warning}"), hint));
     }
-    let summary = slam_into(&dataset, &args.out, args.force, &args.slamming, console)?;
+    let summary = slam_into(&dataset, &args.out, (args.force, args.resume), &args.slamming, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Tracks and maps `dataset` into the RUN folder `out`; with `force` also into a folder of others.
+/// Tracks and maps `dataset` into the RUN folder `out`; with `force` also into a folder of others. With
+/// `resume`, goes on from the checkpoint there.
 ///
 /// # Errors
 /// As [`run`].
 pub fn slam_into(
     dataset: &Dataset,
     out: &Path,
-    force: bool,
+    (force, resume): (bool, bool),
     args: &Slamming,
     console: &Console,
 ) -> anyhow::Result<Summary> {
@@ -64,11 +66,14 @@ pub fn slam_into(
         }
         interrupt::flow()
     };
-    let finished = run_slam(dataset, &SlamSettings::from(args), folder, describe(dataset, args), observe);
+    let finished =
+        run_slam(dataset, &SlamSettings::from(args), folder, resume, describe(dataset, args), observe);
     progress.finish_and_clear();
     if let Err(SlamError::Stopped) = finished {
         let message = format!("stopped; {} holds the frames so far, marked as incomplete", out.display());
-        return Err(interrupted(message, format!("`{}` starts again", interrupt::command_to_go_on(false))));
+        let goes_on = if args.realtime { "starts again" } else { "goes on" };
+        let command = interrupt::command_to_go_on(!args.realtime);
+        return Err(interrupted(message, format!("`{command}` {goes_on}")));
     }
     let summary = finished.or_else(|error| advise(error, dataset))?;
     announce(&summary, out, console);
@@ -100,6 +105,8 @@ fn advise(error: SlamError, dataset: &Dataset) -> anyhow::Result<Summary> {
     let disk_is_full = match &error {
         SlamError::Run(error) => is_disk_full(error),
         SlamError::Map(MapError::Run(error)) => is_disk_full(error),
+        SlamError::Checkpoint(CheckpointError::File(error))
+        | SlamError::Map(MapError::Checkpoint(CheckpointError::File(error))) => is_disk_full(error),
         _ => false,
     };
     if disk_is_full {
@@ -111,6 +118,9 @@ fn advise(error: SlamError, dataset: &Dataset) -> anyhow::Result<Summary> {
     let hint = match &error {
         SlamError::Tracking(TrackingError::Camera(_)) => CAMERA_HINT,
         SlamError::Run(RunError::Unwritable { .. }) => OUT_HINT,
+        SlamError::Checkpoint(_) | SlamError::Map(MapError::Checkpoint(_)) => {
+            "start without --resume, or with the data set and options of the stopped run"
+        }
         SlamError::Map(_) => "a map needs frames with depth that can be tracked; see `mba info DATASET`",
         _ => "see `mba info DATASET`",
     };

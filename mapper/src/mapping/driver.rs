@@ -1,7 +1,6 @@
 //! The run from start to end.
 
 use std::ops::ControlFlow;
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -10,7 +9,7 @@ use super::between::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, merit, output};
 use crate::bundle::{BundleAdjustment, BundleState, MapSize};
-use crate::checkpoint::{Fingerprint, Identity, load, save};
+use crate::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use crate::dataset::Dataset;
 use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
@@ -46,9 +45,16 @@ struct Saved {
     running: Running,
 }
 
+/// The same as it is written.
+#[derive(Serialize)]
+struct Saving<'a> {
+    state: &'a BundleState,
+    running: Running,
+}
+
 /// What the driver keeps of the steps: seconds for the map so far, and smoothed figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Running {
+pub(crate) struct Running {
     pub(super) seconds: f64,
     loss: f64,
     mean_square: f64,
@@ -97,8 +103,9 @@ pub fn map_dataset(
     output::push_tracked(&mut writer, &frames)?;
     let earlier = running.seconds;
     let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
-    let checkpoint =
-        Checkpoint { path: &checkpoint, identity: &identity, interval: settings.checkpoint_interval };
+    let keep =
+        |state: &BundleState, running: Running| save(&checkpoint, &identity, &Saving { state, running });
+    let checkpoint = Checkpoint { interval: settings.checkpoint_interval, keep: &keep };
     let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
     running.seconds = adjustment.seconds();
@@ -163,12 +170,17 @@ pub(super) struct Adjustment<'a> {
     pub(super) earlier: f64,
 }
 
-/// Where the state is kept while the loop runs.
-pub(super) struct Checkpoint<'a> {
-    path: &'a Path,
-    identity: &'a Identity,
-    interval: Duration,
+/// How the state is kept while the loop runs.
+#[derive(Clone, Copy)]
+pub(crate) struct Checkpoint<'a> {
+    /// Time between two checkpoints.
+    pub(crate) interval: Duration,
+    /// Writes one.
+    pub(crate) keep: &'a Keep<'a>,
 }
+
+/// Writes a checkpoint of a bundle and of what the loop keeps besides.
+type Keep<'a> = dyn Fn(&BundleState, Running) -> Result<(), CheckpointError> + 'a;
 
 impl Adjustment<'_> {
     pub(super) fn run(
@@ -220,29 +232,26 @@ impl Adjustment<'_> {
         bundle: &BundleAdjustment,
         running: &Running,
     ) -> Result<(), MapError> {
-        #[derive(Serialize)]
-        struct Saving<'a> {
-            state: &'a BundleState,
-            running: Running,
-        }
         let running = Running { seconds: self.seconds(), ..*running };
-        save(checkpoint.path, checkpoint.identity, &Saving { state: &bundle.state, running })?;
-        Ok(())
+        Ok((checkpoint.keep)(&bundle.state, running)?)
     }
 }
 
 /// What a checkpoint has to agree with.
 fn identity(dataset: &Dataset, run: &Run, settings: &MapSettings) -> Identity {
-    let calibration = dataset.calibration();
-    let camera = calibration.camera;
-    let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
+    let camera = dataset.calibration().camera;
     let exposures: Vec<String> = run.exposures.iter().map(|exposure| format!("{exposure:?}")).collect();
     let records: Vec<String> = run.frames.iter().map(|record| format!("{record:?}")).collect();
     Identity {
         program: Fingerprint::of(&(env!("CARGO_PKG_VERSION"), CHECKPOINT_VERSION)),
-        // Not its place or name: a data set may move between two parts of a run.
-        dataset: Fingerprint::of(&(format!("{calibration:?}"), stamps)),
+        dataset: dataset_fingerprint(dataset),
         trajectory: Fingerprint::of(&(exposures, records)),
         settings: Fingerprint::of(&settings.decisive(camera.width * camera.height)),
     }
+}
+
+/// What a data set is, wherever it lies: it may move between two parts of a run.
+pub(crate) fn dataset_fingerprint(dataset: &Dataset) -> Fingerprint {
+    let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
+    Fingerprint::of(&(format!("{:?}", dataset.calibration()), stamps))
 }

@@ -35,11 +35,11 @@ pub struct RunWriter {
     /// Whether the files in the folder are those of this run.
     is_started: bool,
     settings: RunSettings,
-    exposures: Vec<TimedExposure>,
-    frames: Vec<FrameRecord>,
-    skipped: usize,
+    pub(super) exposures: Vec<TimedExposure>,
+    pub(super) frames: Vec<FrameRecord>,
+    pub(super) skipped: usize,
     deblurred: usize,
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
     unwritten: usize,
 }
 

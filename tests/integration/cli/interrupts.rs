@@ -100,7 +100,8 @@ fn track_and_slam_keep_the_frames_so_far() {
         signal(&process, name);
         let (ended, said) = end(process);
         assert_eq!(ended, Some(code), "{command}: {said}");
-        assert!(said.contains("marked as incomplete") && said.contains("starts again"), "{said}");
+        let goes_on = if command == "slam" { " --resume` goes on" } else { "` starts again" };
+        assert!(said.contains("marked as incomplete") && said.contains(goes_on), "{said}");
         let stopped = Run::open(&run).unwrap();
         assert!(!stopped.summary.complete && stopped.exposures.len() >= 40);
         assert!(stopped.exposures.len() < ROUNDS * FRAMES, "{command} had ended");

@@ -21,10 +21,13 @@ pub(crate) struct Outcome {
 /// Kibibytes of address space that a command may ask for: whoever believes a wrong size dies.
 const MEMORY_LIMIT: usize = 3 << 20;
 
+/// Seconds after which a command is killed.
+const TIME_LIMIT: usize = 60;
+
 /// Runs the program in `folder`.
 pub(crate) fn mba(folder: &Path, words: &[&str]) -> Outcome {
     let started = Instant::now();
-    let limited = format!("ulimit -v {MEMORY_LIMIT}; exec \"$0\" \"$@\"");
+    let limited = format!("ulimit -v {MEMORY_LIMIT}; exec timeout -s KILL {TIME_LIMIT} \"$0\" \"$@\"");
     let program = env!("CARGO_BIN_EXE_mba-under-test");
     let output = Command::new("sh")
         .args(["-c", &limited, program])

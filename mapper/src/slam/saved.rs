@@ -273,3 +273,52 @@ pub(super) fn identity(dataset: &Dataset, settings: &SlamSettings) -> Identity {
         settings: Fingerprint::of(&format!("{decisive:?}")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::{RigidTransform, so3};
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    fn some_pose(x: f64) -> RigidTransform {
+        RigidTransform::new(so3::exp(&Vector3::new(0.1, x, -0.3)), Vector3::new(x, 1.0 / 3.0, -0.0))
+    }
+
+    #[test]
+    fn instructions_come_back_bit_for_bit_and_empty_ones_are_not_kept() {
+        let view = SharpView {
+            rgb: vec![1, 2, 255],
+            depth: vec![65_535],
+            world_from_camera: some_pose(0.7),
+            start_from: Some(some_pose(1e-9)),
+        };
+        let told = Instruction { world_move: Some(some_pose(-2.0)), reference: Some(view) };
+        let mut keeper = Keeper::new("nowhere".into(), Identity::default(), Duration::from_secs(20));
+        keeper.note(3, &Instruction::default());
+        keeper.note(7, &told);
+        assert_eq!((keeper.instructions.len(), keeper.view_bytes), (1, 5));
+        let bytes = postcard::to_stdvec(&keeper.instructions).unwrap();
+        let mut replay = Replay::new(9, postcard::from_bytes(&bytes).unwrap());
+        assert_eq!((replay.has(8), replay.has(9)), (true, false));
+        assert!(replay.take(3).reference.is_none());
+        // Debug formatting of numbers tells all bits apart but those of NaN.
+        assert_eq!(format!("{:?}", replay.take(7)), format!("{told:?}"));
+        assert!(replay.take(7).reference.is_none(), "an instruction is followed once");
+    }
+
+    #[test]
+    fn the_first_checkpoint_comes_soon_and_the_next_after_the_interval() {
+        let keeper = |interval: f64| {
+            let interval = Duration::from_secs_f64(interval);
+            Keeper::new("nowhere".into(), Identity::default(), interval)
+        };
+        assert!(keeper(0.0).is_due());
+        let mut waiting = keeper(20.0);
+        assert!(!waiting.is_due());
+        waiting.started = Instant::now().checked_sub(FIRST_AFTER).unwrap();
+        assert!(waiting.is_due());
+        waiting.saved = Some(Instant::now());
+        assert!(!waiting.is_due());
+    }
+}

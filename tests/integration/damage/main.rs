@@ -188,8 +188,8 @@ fn judge(outcome: &Outcome, subject: &Subject, changed: &[PathBuf]) -> Result<()
         Some(1 | 2) if errors.len() == 1 => {
             // The damage can show in another file, whose name is told then: an image that does not fit its calibration.
             let folder = subject.file.split(['/', '.']).next().unwrap_or_default();
-            let names_it =
-                errors[0].contains(folder) || errors[0].contains("the run ") || errors[0].contains("frame");
+            let stem = Path::new(subject.file).file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+            let names_it = [folder, stem, "the run ", "frame "].iter().any(|name| errors[0].contains(name));
             if !names_it {
                 return complain("the sentence names no file");
             }

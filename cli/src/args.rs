@@ -3,12 +3,12 @@
 pub mod map;
 pub mod slam;
 pub mod surface;
+pub mod synth;
 
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
-use mba_mapper::synth::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
@@ -52,7 +52,7 @@ pub enum Command {
     /// Render a blurred sequence, track and map it, and show how well that went; needs no input
     Demo(Demo),
     /// Render a synthetic, motion-blurred RGB-D data set with exact ground truth
-    Synth(Synth),
+    Synth(synth::Synth),
     /// Show what a data set holds, lacks and what is odd about it
     Info(Info),
     /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
@@ -91,126 +91,14 @@ pub struct Demo {
     pub quick: bool,
 }
 
-/// Arguments of `mba synth`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-The data set has rgb/, depth/, lists, calibration.toml, groundtruth.txt and groundtruth_exposure.txt (poses \
-at opening, middle and closing of the shutter). For judging results there are sharp/, every frame without blur \
-and noise, and heldout_views/, such images from poses near the path, in poses.txt, that no frame has. Equal \
-options give equal files.
-
-Examples:
-  mba synth --out data
-  mba synth --out hard --scene hall --blur 24 --exposure 0.028 --frames 60 --seed 7
-  mba synth --out round --path loop --frames 240 --size 320x240 --blur 6
-  mba synth --out clean --response linear --noise off --depth exact")]
-pub struct Synth {
-    /// New or empty folder for the data set
-    #[arg(long, value_name = "DIR")]
-    pub out: PathBuf,
-    /// What the camera sees: room, hall or wall
-    #[arg(long, value_name = "NAME", default_value_t = SynthConfig::default().scene)]
-    pub scene: SceneName,
-    /// Where the camera goes
-    #[arg(long, value_enum, default_value_t)]
-    pub path: PathName,
-    /// Number of frames
-    #[arg(long, value_name = "N", default_value_t = SynthConfig::default().frames)]
-    pub frames: usize,
-    /// Width and height of the images in pixels
-    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
-    pub size: (usize, usize),
-    /// Mean blur length in pixels, that of the path included; 0 is without hand shake
-    #[arg(long, value_name = "PX", default_value_t = 10.0, value_parser = non_negative)]
-    pub blur: f64,
-    /// Time the shutter is open, in seconds
-    #[arg(long, value_name = "S", default_value_t = SynthConfig::default().exposure_seconds)]
-    pub exposure: f64,
-    /// Frames per second
-    #[arg(long, value_name = "HZ", default_value_t = SynthConfig::default().frame_rate)]
-    pub frame_rate: f64,
-    /// How light becomes 8-bit values
-    #[arg(long, value_enum, default_value_t)]
-    pub response: ResponseName,
-    /// Photon and read noise of the colour images
-    #[arg(long, value_enum, default_value_t)]
-    pub noise: Switch,
-    /// Depth as a structured-light sensor sees it, or exact
-    #[arg(long, value_enum, default_value_t)]
-    pub depth: DepthName,
-    /// Seed of hand shake and noise
-    #[arg(long, value_name = "N", default_value_t = SynthConfig::default().seed)]
-    pub seed: u64,
-}
-
-impl Synth {
-    /// The settings of the generator.
-    #[must_use]
-    pub fn config(&self) -> SynthConfig {
-        let defaults = SynthConfig::default();
-        SynthConfig {
-            scene: self.scene,
-            motion: match self.path {
-                PathName::Shake => CameraMotion::Sweep,
-                PathName::Loop => CameraMotion::Loop,
-            },
-            frames: self.frames,
-            width: self.size.0,
-            height: self.size.1,
-            frame_rate: self.frame_rate,
-            exposure_seconds: self.exposure,
-            mean_blur_px: self.blur,
-            noise: (self.noise == Switch::On).then(NoiseModel::default),
-            depth: match self.depth {
-                DepthName::Sensor => DepthSensor::StructuredLight,
-                DepthName::Exact => DepthSensor::Exact,
-            },
-            response: match self.response {
-                ResponseName::Srgb => ResponseCurve::Srgb,
-                ResponseName::Linear => ResponseCurve::Linear,
-            },
-            seed: self.seed,
-            ..defaults
-        }
-    }
-}
-
-/// Values of `--path`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum PathName {
-    /// Slowly to and fro over one side of the scene
-    #[default]
-    Shake,
-    /// Once round the scene, within all frames, and back to where it began
-    Loop,
-}
-
-/// Values of `--response`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum ResponseName {
-    /// The sRGB transfer function
-    #[default]
-    Srgb,
-    /// Proportional to light
-    Linear,
-}
-
-/// Values of `--depth`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum DepthName {
-    /// Noise, steps and holes of a structured-light sensor
-    #[default]
-    Sensor,
-    /// Exact and without holes
-    Exact,
-}
-
 /// Arguments of `mba info`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
 A data set is a folder in the layout of the TUM RGB-D benchmark: rgb.txt and depth.txt (or associations.txt), \
 the images, calibration.toml (not needed for freiburg1 to 3) and, optionally, groundtruth.txt, \
-groundtruth_exposure.txt and exposures.csv.
+groundtruth_exposure.txt, exposures.csv and the recording of an IMU: imu.csv, imu0/data.csv (EuRoC) or \
+accelerometer.txt (TUM). What is printed says of exposure, readout, response and fall-off whether they are \
+recorded or assumed.
 
 Example:
   mba info rgbd_dataset_freiburg1_rpy")]

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use mba_mapper::dataset::{Calibration, Dataset, ExposureSource, Readout, Response, Survey, survey};
+use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::evaluation::associate;
 use serde::Serialize;
 
+use super::camera_facts::CameraFacts;
 use super::open;
 use crate::args::Info;
 use crate::console::Console;
@@ -35,11 +36,8 @@ struct Facts {
     cy: f64,
     distortion: [f64; 5],
     depth_scale: f64,
-    response: &'static str,
-    readout: &'static str,
-    exposure_source: &'static str,
-    shortest_exposure_s: f64,
-    longest_exposure_s: f64,
+    #[serde(flatten)]
+    camera: CameraFacts,
     sampled_frames: usize,
     unreadable_frames: usize,
     frames_without_depth: usize,
@@ -71,9 +69,9 @@ pub fn run(args: &Info, console: &Console) -> anyhow::Result<()> {
 impl Facts {
     fn of(dataset: &Dataset, survey: Survey) -> Self {
         let stamps: Vec<f64> = (0..dataset.len()).map(|k| dataset.timestamp(k)).collect();
-        let exposures = || (0..dataset.len()).map(|k| dataset.exposure_seconds(k));
         let duration_s = stamps.last().zip(stamps.first()).map_or(0.0, |(last, first)| last - first);
         let calibration = dataset.calibration();
+        let facts = CameraFacts::of(dataset);
         let (camera, lens) = (calibration.camera, calibration.distortion);
         Self {
             name: dataset.name().to_owned(),
@@ -90,11 +88,6 @@ impl Facts {
             cy: camera.cy,
             distortion: [lens.k1, lens.k2, lens.p1, lens.p2, lens.k3],
             depth_scale: calibration.depth_scale,
-            response: response_name(calibration),
-            readout: readout_name(calibration.readout),
-            exposure_source: exposure_name(calibration.exposure),
-            shortest_exposure_s: exposures().fold(f64::INFINITY, f64::min),
-            longest_exposure_s: exposures().fold(0.0, f64::max),
             sampled_frames: survey.sampled,
             unreadable_frames: survey.unreadable.len(),
             frames_without_depth: survey.without_depth,
@@ -103,7 +96,8 @@ impl Facts {
             ground_truth_poses: dataset.ground_truth().len(),
             ground_truth_share_of_frames: truth_share(dataset, &stamps),
             ground_truth_exposures: dataset.ground_truth_exposures().len(),
-            warnings: warnings(dataset, survey),
+            warnings: warnings(dataset, &facts, survey),
+            camera: facts,
         }
     }
 }
@@ -115,8 +109,9 @@ fn truth_share(dataset: &Dataset, stamps: &[f64]) -> f64 {
     associate(&truth, stamps, 0.5 * interval).len() as f64 / stamps.len().max(1) as f64
 }
 
-fn warnings(dataset: &Dataset, survey: Survey) -> Vec<String> {
+fn warnings(dataset: &Dataset, camera: &CameraFacts, survey: Survey) -> Vec<String> {
     let mut warnings: Vec<String> = dataset.warnings().iter().map(ToString::to_string).collect();
+    warnings.extend(camera.contradictions(dataset));
     warnings.extend(grouped(survey.unreadable, dataset.folder()));
     if let Some(median) = survey.median_depth.filter(|median| !PLAUSIBLE_DEPTH.contains(median)) {
         warnings.push(format!("the median depth is {median} m: is depth_scale in raw units per metre?"));
@@ -151,29 +146,6 @@ fn grouped(sentences: Vec<String>, folder: &Path) -> Vec<String> {
     groups.into_iter().map(|(_, count, first)| first + &more(count - 1)).collect()
 }
 
-fn response_name(calibration: &Calibration) -> &'static str {
-    match calibration.response {
-        Response::Srgb => "srgb",
-        Response::Linear => "linear",
-        Response::Table(_) => "table",
-    }
-}
-
-fn readout_name(readout: Readout) -> &'static str {
-    match readout {
-        Readout::Global => "global",
-        Readout::Rolling { .. } => "rolling",
-    }
-}
-
-fn exposure_name(source: ExposureSource) -> &'static str {
-    match source {
-        ExposureSource::Constant { .. } => "calibration",
-        ExposureSource::PerFrame => "per frame",
-        ExposureSource::Assumed { .. } => "assumed",
-    }
-}
-
 fn table(facts: &Facts) -> String {
     let rate = facts.measured_rate_hz.map_or(String::new(), |hz| format!(", {hz:.2} frames per second"));
     let missing = facts.missing_depth_share.map_or_else(|| "unknown".into(), percent);
@@ -189,26 +161,17 @@ fn table(facts: &Facts) -> String {
         ("focal length", format!("{:.2} {:.2} px", facts.fx, facts.fy)),
         ("principal point", format!("{:.2} {:.2} px", facts.cx, facts.cy)),
         ("distortion", distortion(&facts.distortion)),
-        ("response, readout", format!("{}, {}", facts.response, facts.readout)),
-        ("exposure", exposure(facts)),
+    ];
+    rows.extend(facts.camera.rows());
+    rows.extend([
         ("depth scale", format!("{} per metre", facts.depth_scale)),
         ("median depth", depth),
         ("missing depth", format!("{missing} of {} sampled frames", facts.sampled_frames)),
         ("ground truth", truth),
         ("true exposures", facts.ground_truth_exposures.to_string()),
-    ];
+    ]);
     rows.extend(facts.warnings.iter().map(|warning| ("warning", warning.clone())));
     pairs(&rows)
-}
-
-fn exposure(facts: &Facts) -> String {
-    let (shortest, longest) = (1e3 * facts.shortest_exposure_s, 1e3 * facts.longest_exposure_s);
-    let range = if shortest == longest {
-        format!("{shortest:.2} ms")
-    } else {
-        format!("{shortest:.2} to {longest:.2} ms")
-    };
-    format!("{range} ({})", facts.exposure_source)
 }
 
 fn distortion(coefficients: &[f64; 5]) -> String {

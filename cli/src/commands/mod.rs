@@ -2,6 +2,7 @@
 
 pub mod ablate;
 pub mod alignment;
+mod camera_facts;
 pub mod demo;
 pub mod eval_images;
 pub mod eval_mesh;

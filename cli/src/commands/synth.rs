@@ -6,7 +6,7 @@ use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset};
 use serde::Serialize;
 
 use super::written_run::{OUT_HINT, refuse};
-use crate::args::Synth;
+use crate::args::synth::Synth;
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
 use crate::report::table::pairs;
@@ -24,9 +24,11 @@ pub struct Written {
 /// Renders a sequence and prints what was written.
 ///
 /// # Errors
-/// Bad input when a setting is out of range or the folder is in use; failure when it cannot be written.
+/// Bad input when a setting is out of range, the response unreadable or the folder in use; failure when it cannot be
+/// written.
 pub fn run(args: &Synth, console: &Console) -> anyhow::Result<()> {
-    let written = synthesise(args.config(), &args.out, console)?;
+    let config = args.config().or_bad_input("see `mba synth --help` for what a response is")?;
+    let written = synthesise(config, &args.out, console)?;
     console.result(&written, table)
 }
 

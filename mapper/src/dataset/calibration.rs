@@ -276,7 +276,9 @@ impl Calibration {
     /// Checks fall-off and the axes of the IMU.
     fn check_optics(&self) -> Result<(), InvalidValue> {
         let Vignetting { a2, a4 } = self.vignetting;
-        if !(a2.is_finite() && a4.is_finite() && self.vignetting.least() > 0.0) {
+        // Written so that NaN is refused.
+        let is_lit = self.vignetting.least() > 0.0;
+        if !is_lit {
             return Err(InvalidValue {
                 key: "vignetting",
                 value: format!("[{a2}, {a4}]"),

@@ -37,6 +37,8 @@ mod vignetting;
 use std::fs;
 use std::path::Path;
 
+use mba_tracker::photometric::InverseResponse;
+
 use crate::FileError;
 pub use crate::trajectory_file::{TimedExposure, TimedPose};
 pub use calibration::{
@@ -50,6 +52,7 @@ pub use exposure_list::write_exposure_times;
 pub use frame::RgbdFrame;
 pub use frame::read_image;
 pub use knowledge::{CalibrationSources, CameraFact, Knowledge};
+pub(crate) use response_table::to_text as response_text;
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
 pub use vignetting::Vignetting;
@@ -112,4 +115,14 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, DatasetError> {
     let mut calibration = calibration_file::read(path, None, &mut Vec::new())?;
     calibration.settle_exposure(false);
     Ok(calibration)
+}
+
+/// Reads a measured response: 256 increasing numbers, the light of each code, or rows under the header `light,value`
+/// that sample what is stored for some light.
+///
+/// # Errors
+///
+/// [`FileError`] if the file is unreadable or no response.
+pub fn read_response(path: &Path) -> Result<InverseResponse, FileError> {
+    response_table::read(path)
 }

@@ -38,8 +38,11 @@ impl Vignetting {
         if corner > 0.0 { self.falloff((across * across + down * down) / corner) } else { 1.0 }
     }
 
-    /// Least share of the light anywhere in the image.
-    pub(super) fn least(&self) -> f64 {
+    /// Least share of the light anywhere in the image; no number if a coefficient is none.
+    pub(crate) fn least(&self) -> f64 {
+        if !(self.a2.is_finite() && self.a4.is_finite()) {
+            return f64::NAN;
+        }
         let ends = self.falloff(0.0).min(self.falloff(1.0));
         let turn = -self.a2 / (2.0 * self.a4);
         if (0.0..=1.0).contains(&turn) { ends.min(self.falloff(turn)) } else { ends }
@@ -89,5 +92,6 @@ mod tests {
         assert_eq!(Vignetting { a2: -0.5, a4: 0.1 }.least(), 0.6);
         assert_eq!(Vignetting { a2: 0.5, a4: 0.1 }.least(), 1.0);
         assert_eq!(Vignetting::NONE.least(), 1.0);
+        assert!(Vignetting { a2: f64::NAN, a4: 0.0 }.least().is_nan());
     }
 }

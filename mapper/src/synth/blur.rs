@@ -75,21 +75,22 @@ pub(super) fn of_exposure(scene: &Scene, camera: &PinholeCamera, poses: &Exposur
     measure(scene, camera, poses, GRID)
 }
 
-/// The path scaled so that the mean blur over the exposures, given by their three times each, is `requested` px.
+/// The path scaled so that the mean blur over all exposures, of which `exposures` gives the poses along a path, is
+/// `requested` px. `usual_exposure` in seconds is for the message.
 pub(super) fn scale_to_blur(
     path: &CameraPath,
     scene: &Scene,
     camera: &PinholeCamera,
-    exposures: &[[f64; 3]],
+    exposures: impl Fn(&CameraPath) -> Vec<ExposurePoses>,
     requested: f64,
+    usual_exposure: f64,
 ) -> Result<CameraPath, SynthError> {
-    // The mean over hundreds of frames needs few pixels of each.
-    let grid = if exposures.len() > 60 { [8, 6] } else { GRID };
     let mean_blur = |strength: f64| {
-        let path = path.with_strength(strength);
+        let exposures = exposures(&path.with_strength(strength));
+        // The mean over hundreds of frames needs few pixels of each.
+        let grid = if exposures.len() > 60 { [8, 6] } else { GRID };
         // Collected in order: the sum must not depend on the threads.
-        let of_frame =
-            |times: &[f64; 3]| measure(scene, camera, &times.map(|time| path.pose(time)), grid).mean_px;
+        let of_frame = |poses: &ExposurePoses| measure(scene, camera, poses, grid).mean_px;
         let means: Vec<f64> = exposures.par_iter().map(of_frame).collect();
         means.iter().sum::<f64>() / means.len() as f64
     };
@@ -102,7 +103,7 @@ pub(super) fn scale_to_blur(
     }
     let reachable = mean_blur(path.strongest());
     if reachable < requested {
-        let exposure_seconds = exposures.first().map_or(0.0, |times| times[2] - times[0]);
+        let exposure_seconds = usual_exposure;
         return Err(SynthError::BlurOutOfReach { requested, exposure_seconds, reachable });
     }
     let (mut low, mut high) = (0.0, path.strongest());

@@ -4,11 +4,13 @@ use std::fmt;
 use std::str::FromStr;
 
 use mba_tracker::geometry::PinholeCamera;
+use mba_tracker::photometric::InverseResponse;
 
-use super::SynthError;
+use super::{Events, SynthError};
+use crate::dataset::Vignetting;
 
 /// Settings of a synthetic sequence; the same settings give the same sequence, bit for bit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SynthConfig {
     /// The world that is filmed.
     pub scene: SceneName,
@@ -38,6 +40,49 @@ pub struct SynthConfig {
     pub depth: DepthSensor,
     /// Seed of hand shake and noise. The scenes are always the same.
     pub seed: u64,
+    /// In what the camera differs from one with a global shutter and everything on record.
+    pub sensor: SensorModel,
+    /// What goes wrong on the way.
+    pub events: Events,
+}
+
+/// In what a camera differs from an ideal one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorModel {
+    /// Time from the exposure of the first row to that of the last, seconds; negative when the last comes first, 0 for
+    /// a global shutter. At most 0.1 and the frame interval. Row v is exposed around the timestamp plus
+    /// `((v + 1/2) / height - 1/2)` of it.
+    pub readout_seconds: f64,
+    /// How much later than the middle of the colour image depth is measured, all rows together, seconds; from -0.2 to
+    /// 0.2.
+    pub depth_delay_seconds: f64,
+    /// Whether exposure times follow the brightness of the frame before, between 7/16 and 18/16 of the one that is
+    /// set. The gain stays, so a longer exposure is a brighter picture.
+    pub auto_exposure: bool,
+    /// How light falls off towards the corners; above 0 everywhere.
+    pub vignetting: Vignetting,
+    /// Whether an IMU records, at the camera's centre and in its axes.
+    pub imu: bool,
+    /// Whether exposure times, readout time, response and fall-off are on record.
+    pub is_on_record: bool,
+}
+
+impl SensorModel {
+    /// A global shutter of constant exposure, depth at the same time, no fall-off, no IMU, everything on record.
+    pub const IDEAL: Self = Self {
+        readout_seconds: 0.0,
+        depth_delay_seconds: 0.0,
+        auto_exposure: false,
+        vignetting: Vignetting::NONE,
+        imu: false,
+        is_on_record: true,
+    };
+}
+
+impl Default for SensorModel {
+    fn default() -> Self {
+        Self::IDEAL
+    }
 }
 
 impl Default for SynthConfig {
@@ -56,6 +101,8 @@ impl Default for SynthConfig {
             noise: None,
             depth: DepthSensor::Exact,
             seed: 1,
+            sensor: SensorModel::IDEAL,
+            events: Events::NONE,
         }
     }
 }
@@ -83,15 +130,17 @@ pub enum CameraMotion {
 }
 
 /// How the stored 8-bit values follow from light.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ResponseCurve {
     /// The sRGB transfer function (IEC 61966-2-1).
     Srgb,
     /// Proportional to light.
     Linear,
+    /// The response of a real camera, given by the light of each code; straight lines in between.
+    Measured(Box<InverseResponse>),
 }
 
-/// How depth is measured, always at mid exposure.
+/// How depth is measured, all pixels at one time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DepthSensor {
     /// The true depth, rounded to the file's 0.2 mm.
@@ -154,20 +203,66 @@ impl SynthConfig {
             ("full well", well, 1.0..=1e9, "1 to 1e9 electrons"),
             ("read noise", read, 0.0..=1e9, "0 to 1e9 electrons"),
         ];
+        self.check_sensor()?;
+        self.check_events()?;
         match checks.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
             Some((setting, value, _, expected)) => Err(SynthError::Setting { setting, value, expected }),
             None => Ok(()),
         }
     }
+
+    /// Checks what differs from an ideal camera.
+    fn check_sensor(&self) -> Result<(), SynthError> {
+        let SensorModel { readout_seconds, depth_delay_seconds, vignetting, .. } = self.sensor;
+        let longest_readout = (1.0 / self.frame_rate).min(0.1);
+        let checks = [
+            (
+                "readout",
+                readout_seconds,
+                -longest_readout..=longest_readout,
+                "seconds of at most 0.1 and the frame interval, either way",
+            ),
+            ("depth delay", depth_delay_seconds, -0.2..=0.2, "-0.2 to 0.2 seconds"),
+            ("least light of the fall-off", vignetting.least(), 1e-3..=1.0, "0.001 to 1"),
+        ];
+        match checks.into_iter().find(|(_, value, range, _)| !range.contains(value)) {
+            Some((setting, value, _, expected)) => Err(SynthError::Setting { setting, value, expected }),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that what goes wrong does so within the sequence.
+    fn check_events(&self) -> Result<(), SynthError> {
+        let Events { black, saturated, jump } = &self.events;
+        let beyond = |index: &usize| *index >= self.frames;
+        let outside = |setting, index: usize, expected| {
+            Err(SynthError::Setting { setting, value: index as f64, expected })
+        };
+        for (setting, ranges) in [("black frame", black), ("saturated frame", saturated)] {
+            if let Some(index) = ranges.last().filter(beyond) {
+                return outside(setting, index, "frames of the sequence, counted from 0");
+            }
+        }
+        match *jump {
+            Some(index) if index == 0 || beyond(&index) => {
+                outside("jump at frame", index, "a frame of the sequence after the first")
+            }
+            Some(index) if self.sensor.imu => {
+                outside("jump at frame", index, "none with an IMU, which would have to feel it")
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 impl ResponseCurve {
-    /// Name as in `calibration.toml`.
+    /// Name as in `calibration.toml`; a measured response is in the file of this name.
     #[must_use]
-    pub fn name(self) -> &'static str {
+    pub fn name(&self) -> &'static str {
         match self {
             Self::Srgb => "srgb",
             Self::Linear => "linear",
+            Self::Measured(_) => "response_table.csv",
         }
     }
 }

@@ -26,6 +26,12 @@ pub enum SynthError {
         /// The name asked for.
         name: String,
     },
+    /// A text that names no frames.
+    #[error("\"{text}\" are no frames; ranges such as 10-15,20 are needed")]
+    FrameRanges {
+        /// The text.
+        text: String,
+    },
     /// Even the strongest hand shake moves the image too little while the shutter is open.
     #[error(
         "mean blur of {requested} px cannot be reached with an exposure of {exposure_seconds} s, at most \

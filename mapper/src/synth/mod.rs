@@ -2,7 +2,8 @@
 //!
 //! A ray caster films analytic scenes with a camera that sweeps slowly, or goes round, and shakes. Each frame is the mean, in
 //! linear light, of many views within the exposure, so its blur is that of the true motion, which is smooth but
-//! not linear. Then come gain, noise, response and rounding. On one machine equal settings give equal sequences
+//! not linear. Then come fall-off, gain, noise, response and rounding. A [`SensorModel`] has rows that are exposed one
+//! after the other, depth that comes late, exposure times of its own choice and an IMU. On one machine equal settings give equal sequences
 //! bit for bit, for any number of threads.
 //!
 //! World y is up; camera x is right, y down, z forward; poses are `world_from_camera`; metres and seconds.
@@ -18,27 +19,35 @@
 //! # Ok::<(), mba_mapper::synth::SynthError>(())
 //! ```
 
+mod auto_exposure;
 mod blur;
 mod config;
 mod depth_sensor;
 mod description;
 mod develop;
 mod error;
+mod events;
 mod heldout;
+mod inertial;
 mod motion;
 mod random;
 mod render;
 mod round;
 mod scene;
+#[cfg(test)]
+mod sensor_tests;
 mod sequence;
 #[cfg(test)]
 mod sequence_tests;
 mod surface;
+mod timing;
+mod truth;
 mod view;
 mod writer;
 
 pub use blur::BlurFigure;
-pub use config::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName, SynthConfig};
+pub use config::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName, SensorModel, SynthConfig};
 pub use error::SynthError;
+pub use events::{Events, FrameRanges};
 pub use sequence::{SynthFrame, SynthSequence};
 pub use writer::{Summary, write_dataset};

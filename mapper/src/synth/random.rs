@@ -9,6 +9,7 @@ pub(super) enum Purpose {
     Shake = 1,
     Colour = 2,
     Depth = 3,
+    Inertial = 4,
 }
 
 /// Random numbers of one row of one frame.

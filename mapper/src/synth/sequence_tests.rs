@@ -25,7 +25,7 @@ fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 fn number_of_threads_changes_nothing() {
     let config =
         SynthConfig { noise: Some(NoiseModel::default()), depth: DepthSensor::StructuredLight, ..small() };
-    let render = |threads| with_threads(threads, || sequence(config).render_frame(3));
+    let render = |threads| with_threads(threads, || sequence(config.clone()).render_frame(3));
     let (one, three) = (render(1), render(3));
     assert_eq!(one.rgb, three.rgb);
     assert_eq!(one.depth, three.depth);
@@ -35,7 +35,7 @@ fn number_of_threads_changes_nothing() {
 #[test]
 fn seeds_change_shake_and_noise() {
     let noisy = SynthConfig { mean_blur_px: 0.0, noise: Some(NoiseModel::default()), ..small() };
-    let render = |seed, index| sequence(SynthConfig { seed, ..noisy }).render_frame(index).rgb;
+    let render = |seed, index| sequence(SynthConfig { seed, ..noisy.clone() }).render_frame(index).rgb;
     assert_ne!(render(1, 0), render(2, 0), "noise differs between seeds");
     assert_ne!(render(1, 0), render(1, 1), "noise differs between frames");
     let pose = |seed| sequence(SynthConfig { seed, ..small() }).world_from_camera(0.2);
@@ -271,7 +271,7 @@ fn a_loop_ends_where_it_began_and_sees_nothing_of_that_half_way() {
 #[test]
 fn a_loop_cannot_have_less_blur_than_its_way() {
     let hasty = SynthConfig { motion: CameraMotion::Loop, frames: 30, mean_blur_px: 0.5, ..small() };
-    let error = SynthSequence::new(hasty).err().unwrap();
+    let error = SynthSequence::new(hasty.clone()).err().unwrap();
     let SynthError::BlurOfTheWay { requested, least } = error else { panic!("{error}") };
     // A turn of 360 degrees in 29 intervals, 16 ms of 33.3 ms each: 0.104 rad, at 75 px and more away from the middle.
     assert!(requested == 0.5 && (7.5..14.0).contains(&least), "{least}");

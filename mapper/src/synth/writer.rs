@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
-use super::{BlurFigure, SynthError, SynthSequence, description};
+use super::{BlurFigure, SynthError, SynthSequence, description, inertial, truth};
 use crate::output::OutputFolder;
 use crate::png::{encode_depth, encode_rgb};
 use crate::surfaces::{Mesh, write_mesh};
@@ -34,17 +34,17 @@ struct Written {
     sub_frames: usize,
 }
 
-/// Rate of the gyroscope samples, Hz.
-const GYRO_HERTZ: f64 = 200.0;
-
 /// Folder of the views that no frame sees.
 const HELDOUT_FOLDER: &str = "heldout_views";
+
+/// File of the poses of those views, in their folder.
+const POSES_FILE: &str = "poses.txt";
 
 /// Folders of images.
 const IMAGE_FOLDERS: [&str; 4] = ["rgb", "depth", "sharp", HELDOUT_FOLDER];
 
-/// Files beside them, the calibration last.
-const FILES: [&str; 10] = [
+/// Texts and the surface, in the folder itself or among what is not on record.
+const FILES: [&str; 13] = [
     "groundtruth.txt",
     "groundtruth_exposure.txt",
     SURFACE_FILE,
@@ -52,7 +52,10 @@ const FILES: [&str; 10] = [
     "depth.txt",
     "associations.txt",
     "blur.csv",
-    "gyro.csv",
+    "imu.csv",
+    "exposures.csv",
+    "response.csv",
+    "response_table.csv",
     "README.md",
     CALIBRATION_FILE,
 ];
@@ -60,15 +63,13 @@ const FILES: [&str; 10] = [
 /// File that a complete data set has.
 const CALIBRATION_FILE: &str = "calibration.toml";
 
-/// File of the poses of those views, in their folder.
-const POSES_FILE: &str = "poses.txt";
-
 /// File of points of the true surface.
 const SURFACE_FILE: &str = "surface_points.ply";
 
 /// Renders the sequence into `folder` in the native layout (TUM lists, `calibration.toml`) with ground truth,
-/// sharp images, held-out views, points of the true surface, blur figures, gyroscope rates and a README. Calls `progress(done, frames)` after each frame, from
-/// any thread and in any order.
+/// sharp images, held-out views, points of the true surface, blur figures and a README; where the settings ask for
+/// them, with exposure times, a recording of an IMU, and what is not on record in a folder `truth`. Calls
+/// `progress(done, frames)` after each frame, from any thread and in any order.
 ///
 /// The folder is made if it does not exist. The calibration is written last, so that a folder with it is complete; what
 /// a process that was killed left of one without is replaced.
@@ -92,7 +93,8 @@ fn write_all(
     folder: &Path,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Summary, SynthError> {
-    for name in IMAGE_FOLDERS {
+    let truth = (!sequence.config().sensor.is_on_record).then_some(truth::FOLDER);
+    for name in IMAGE_FOLDERS.into_iter().chain(truth) {
         let path = folder.join(name);
         fs::create_dir(&path).map_err(|reason| SynthError::unwritable(path, reason))?;
     }
@@ -109,19 +111,37 @@ fn write_all(
     write_heldout_views(sequence, folder)?;
     let surface = Mesh { vertices: sequence.surface_points(), ..Mesh::default() };
     write_mesh(&folder.join(SURFACE_FILE), &surface)?;
-    let texts = [
-        ("rgb.txt", image_list(sequence, "rgb")),
-        ("depth.txt", image_list(sequence, "depth")),
-        ("associations.txt", associations(sequence)),
-        ("blur.csv", blur_table(sequence, &written)),
-        ("gyro.csv", gyro_table(sequence)),
-        ("README.md", description::readme(sequence, &summary)),
-        (CALIBRATION_FILE, description::calibration(sequence)),
-    ];
-    for (name, text) in texts {
+    if !sequence.config().sensor.is_on_record {
+        truth::write(sequence, folder)?;
+    }
+    for (name, text) in texts(sequence, &summary, &written) {
         write_text(&folder.join(name), &text)?;
     }
     Ok(summary)
+}
+
+/// Names and contents of the text files, the calibration last.
+fn texts(sequence: &SynthSequence, summary: &Summary, written: &[Written]) -> Vec<(&'static str, String)> {
+    let config = sequence.config();
+    let mut texts = vec![
+        ("rgb.txt", image_list(sequence, "rgb", SynthSequence::timestamp)),
+        ("depth.txt", image_list(sequence, "depth", SynthSequence::depth_timestamp)),
+        ("associations.txt", associations(sequence)),
+        ("blur.csv", blur_table(sequence, written)),
+        ("README.md", description::readme(sequence, summary)),
+    ];
+    if config.sensor.imu {
+        texts.push(("imu.csv", inertial::table(sequence)));
+    }
+    if config.sensor.is_on_record {
+        texts
+            .extend(config.sensor.auto_exposure.then(|| ("exposures.csv", description::exposures(sequence))));
+        texts.extend(description::response_table(&config.response));
+        texts.push((CALIBRATION_FILE, description::calibration(sequence)));
+    } else {
+        texts.push((CALIBRATION_FILE, description::bare_calibration(sequence)));
+    }
+    texts
 }
 
 /// Claims a folder that is new, empty, or left by a process that was killed before it was done.
@@ -151,7 +171,11 @@ fn clear(folder: &Path) {
         remove(images.join(POSES_FILE));
         let _ = fs::remove_dir(images);
     }
-    FILES.iter().for_each(|name| remove(folder.join(name)));
+    let truth = folder.join(truth::FOLDER);
+    for place in [&truth, folder] {
+        FILES.iter().for_each(|name| remove(place.join(name)));
+    }
+    let _ = fs::remove_dir(truth);
 }
 
 /// Whether a file is named like an image of a data set, or like one that is being written.
@@ -187,14 +211,8 @@ fn summarise(written: &[Written]) -> Summary {
 
 fn write_ground_truth(sequence: &SynthSequence, folder: &Path) -> Result<(), SynthError> {
     let exposure = |index: usize| {
-        let timestamp = sequence.timestamp(index);
-        let ends = sequence.exposure(index);
-        TimedExposure {
-            timestamp,
-            start: ends.start,
-            mid: sequence.world_from_camera(timestamp),
-            end: ends.end,
-        }
+        let [start, mid, end] = sequence.exposure_poses(index, 0.0);
+        TimedExposure { timestamp: sequence.timestamp(index), start, mid, end }
     };
     let exposures: Vec<_> = (0..sequence.len()).map(exposure).collect();
     let pose = |exposure: &TimedExposure| TimedPose {
@@ -220,10 +238,10 @@ fn write_heldout_views(sequence: &SynthSequence, folder: &Path) -> Result<(), Sy
 }
 
 /// `rgb.txt` or `depth.txt`. Writing to a string cannot fail.
-fn image_list(sequence: &SynthSequence, kind: &str) -> String {
+fn image_list(sequence: &SynthSequence, kind: &str, time: fn(&SynthSequence, usize) -> f64) -> String {
     let mut text = format!("# {kind} images\n# timestamp filename\n");
     for index in 0..sequence.len() {
-        let _ = writeln!(text, "{:.6} {kind}/{index:06}.png", sequence.timestamp(index));
+        let _ = writeln!(text, "{:.6} {kind}/{index:06}.png", time(sequence, index));
     }
     text
 }
@@ -231,33 +249,18 @@ fn image_list(sequence: &SynthSequence, kind: &str) -> String {
 fn associations(sequence: &SynthSequence) -> String {
     let mut text = String::new();
     for index in 0..sequence.len() {
-        let time = sequence.timestamp(index);
-        let _ = writeln!(text, "{time:.6} rgb/{index:06}.png {time:.6} depth/{index:06}.png");
+        let (colour, depth) = (sequence.timestamp(index), sequence.depth_timestamp(index));
+        let _ = writeln!(text, "{colour:.6} rgb/{index:06}.png {depth:.6} depth/{index:06}.png");
     }
     text
 }
 
 fn blur_table(sequence: &SynthSequence, written: &[Written]) -> String {
     let mut text = String::from("frame,timestamp,exposure_s,mean_px,p95_px,subframes\n");
-    let exposure = sequence.config().exposure_seconds;
     for (index, Written { blur, sub_frames }) in written.iter().enumerate() {
         let BlurFigure { mean_px, p95_px, .. } = blur;
-        let time = sequence.timestamp(index);
+        let (time, exposure) = (sequence.timestamp(index), sequence.exposure_seconds(index));
         let _ = writeln!(text, "{index},{time:.6},{exposure:.6},{mean_px:.3},{p95_px:.3},{sub_frames}");
-    }
-    text
-}
-
-/// Angular velocities in camera axes, from a tenth of a second before the first frame to as much after the last.
-fn gyro_table(sequence: &SynthSequence) -> String {
-    let mut text = String::from("timestamp,wx_rad_s,wy_rad_s,wz_rad_s\n");
-    let from = sequence.timestamp(0) - 0.1;
-    let until = sequence.timestamp(sequence.len() - 1) + 0.1;
-    let samples = ((until - from) * GYRO_HERTZ).round() as usize;
-    for sample in 0..=samples {
-        let time = from + sample as f64 / GYRO_HERTZ;
-        let rate = sequence.angular_velocity(time);
-        let _ = writeln!(text, "{time:.6},{:.9},{:.9},{:.9}", rate.x, rate.y, rate.z);
     }
     text
 }

@@ -9,6 +9,7 @@ mod keyframes;
 mod map;
 mod mesh;
 mod outputs;
+mod real_camera;
 mod render;
 mod slam;
 

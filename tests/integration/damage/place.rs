@@ -90,6 +90,10 @@ fn complete_data_set(data: &Path) {
     let response = calibration.lines().find(|line| line.starts_with("response")).unwrap().to_owned();
     fs::write(data.join("calibration.toml"), calibration.replace(&response, "response = \"response.txt\""))
         .unwrap();
+    let rates: String = (0..300)
+        .map(|k| format!("{:.6},0.1,{:.3},-0.2\n", f64::from(k) / 200.0 - 0.5, 1e-3 * f64::from(k)))
+        .collect();
+    fs::write(data.join("gyro.csv"), format!("timestamp,wx_rad_s,wy_rad_s,wz_rad_s\n{rates}")).unwrap();
     // One of the frames is a JPEG.
     let image = image::open(data.join("rgb/000002.png")).unwrap().into_rgb8();
     image.save(data.join("rgb/000002.jpg")).unwrap();

@@ -3,7 +3,9 @@
 use mba_mapper::evaluation::motion_of;
 use mba_mapper::mapping::MapSettings;
 use mba_mapper::run::Run;
-use mba_mapper::synth::{CameraMotion, DepthSensor, ResponseCurve, SceneName, SynthConfig};
+use mba_mapper::synth::{
+    CameraMotion, DepthSensor, Events, ResponseCurve, SceneName, SensorModel, SynthConfig,
+};
 use mba_mapper::trajectory_file::TimedExposure;
 use mba_tests::blurred_sequence::BlurredSequence;
 use mba_tests::handheld::exposure_errors;
@@ -26,6 +28,8 @@ const CONFIG: SynthConfig = SynthConfig {
     noise: None,
     depth: DepthSensor::Exact,
     seed: 3,
+    sensor: SensorModel::IDEAL,
+    events: Events::NONE,
 };
 
 /// Mean errors in pixels of the middles, as seen from the first, and of the motions of some frames.

@@ -41,7 +41,6 @@ pub fn watch() {
 pub fn watch() {}
 
 /// Whether to go on.
-#[must_use]
 pub fn flow() -> ControlFlow<()> {
     if FIRST.load(Ordering::SeqCst) == 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
 }

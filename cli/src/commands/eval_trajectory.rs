@@ -36,13 +36,12 @@ pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
     let reference = Poses::read(&args.reference)?;
     let estimate = Poses::read(&args.estimate)?;
     let options = TrajectoryOptions { alignment: args.align.into(), max_dt: args.max_dt };
-    let evaluation = evaluate_trajectory(&reference.trajectory, &estimate.trajectory, &options)
-        .map_err(|error| {
+    let evaluation =
+        evaluate_trajectory(&reference.trajectory, &estimate.trajectory, &options).map_err(|error| {
             let [reference, estimate] =
                 [&args.reference, &args.estimate].map(|path| path.display().to_string());
-            (hint(&error), format!("{estimate} against {reference}: {error}"))
-        })
-        .or_else(|(hint, message)| Err(bad_input(message, hint)))?;
+            bad_input(format!("{estimate} against {reference}: {error}"), hint(&error))
+        })?;
     let blur = blur_figures(args, &reference, &estimate, console)?;
     let report = Report { trajectory: TrajectoryFigures::from(&evaluation), blur };
     console.result(&report, |report| {

@@ -221,7 +221,7 @@ impl Calibration {
         self.check_lens()?;
         // Written so that NaN is refused.
         if !(self.depth_scale > 1.0 && self.depth_scale <= MAX_DEPTH_SCALE) {
-            let expected = "raw units of depth per metre, above 1 and at most 1000000 (millimetres are 1000)";
+            let expected = "a positive number of raw units per metre, above 1 and at most 1000000 (millimetres are 1000)";
             return Err(invalid("depth_scale", self.depth_scale, expected));
         }
         check_positive("frame_rate", self.frame_rate, "a positive number of frames per second")?;

@@ -37,7 +37,7 @@ pub(super) enum Saved {
 /// The same as it is written.
 #[derive(Serialize)]
 pub(super) enum Saving<'a> {
-    Growing { mapper: MapperParts, state: &'a BundleState },
+    Growing { mapper: Box<MapperParts>, state: &'a BundleState },
     Refining { parts: &'a RefiningParts, state: &'a BundleState },
 }
 
@@ -246,7 +246,7 @@ impl Keeper {
         if self.view_bytes > MOST_VIEW_BYTES {
             return Ok(());
         }
-        let mapper = parts(std::mem::take(&mut self.instructions), self.seconds());
+        let mapper = Box::new(parts(std::mem::take(&mut self.instructions), self.seconds()));
         let saving = Saving::Growing { mapper, state };
         let written = self.write(&saving);
         if let Saving::Growing { mapper, .. } = saving {

@@ -6,6 +6,8 @@ mod eval_images;
 #[cfg(unix)]
 mod interrupts;
 mod keyframes;
+#[cfg(unix)]
+mod kills;
 mod map;
 mod mesh;
 mod outputs;

@@ -12,7 +12,7 @@ use super::open;
 use super::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
-use crate::failure::{OrBadInput, interrupted, is_disk_full};
+use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
 use crate::interrupt;
 use crate::report::table;
 
@@ -58,7 +58,7 @@ pub fn map_into(
         let message = format!("stopped; {} holds the tracked poses and a checkpoint", out.display());
         return Err(interrupted(message, format!("`{}` goes on", interrupt::command_to_go_on(true))));
     }
-    let summary = mapped.or_else(advise)?;
+    let summary = mapped.or_else(|error| advise(error, run))?;
     announce(&summary, out, console);
     Ok(summary)
 }
@@ -78,7 +78,7 @@ fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
 }
 
 /// Advice for what the user can repair.
-fn advise(error: MapError) -> anyhow::Result<Summary> {
+fn advise(error: MapError, run: &Run) -> anyhow::Result<Summary> {
     let disk_is_full = match &error {
         MapError::Run(error) => is_disk_full(error),
         MapError::Checkpoint(CheckpointError::File(error)) => is_disk_full(error),
@@ -86,6 +86,10 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
     };
     if disk_is_full {
         return Err(error.into());
+    }
+    if let MapError::Continuity(error) = &error {
+        let message = format!("the poses of {} make no path: {error}", run.folder.display());
+        return Err(bad_input(message, "track the data set again"));
     }
     let hint = match &error {
         MapError::Frames { .. } | MapError::Timestamp { .. } => {
@@ -96,7 +100,6 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
         MapError::Checkpoint(_) => {
             "start without --resume, or with the inputs and options of the stopped run"
         }
-        MapError::Continuity(_) => "track the data set again",
         _ => OUT_HINT,
     };
     Err(error).or_bad_input(hint)

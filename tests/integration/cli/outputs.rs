@@ -111,7 +111,7 @@ fn what_the_command_reads_is_not_written() {
     }
     let glb = command(&place, &["mesh", ":mapped", "--out", ":mesh.glb"]);
     glb.assert_error(2, &["mesh.glb", "PLY"]);
-    assert_eq!(differences(&before, &tree(&place.path(""))), [PathBuf::new(); 0]);
+    assert_eq!(differences(&before, &tree(&place.path(""))), Vec::<PathBuf>::new());
 }
 
 #[test]
@@ -163,7 +163,11 @@ fn a_start_that_is_refused_or_finds_nothing_leaves_the_earlier_run() {
     for command_name in ["track", "slam"] {
         let refused = command(&place, &[command_name, ":bad", "--out", ":mapped"]);
         assert_ne!(refused.code, Some(0), "{command_name}: {}", refused.stderr);
-        assert_eq!(differences(&before, &tree(&place.path("mapped"))), [PathBuf::new(); 0], "{command_name}");
+        assert_eq!(
+            differences(&before, &tree(&place.path("mapped"))),
+            Vec::<PathBuf>::new(),
+            "{command_name}"
+        );
     }
     fs::write(place.path("bad/calibration.toml"), calibration).unwrap();
     for frame in 0..FRAMES {
@@ -172,7 +176,11 @@ fn a_start_that_is_refused_or_finds_nothing_leaves_the_earlier_run() {
     for command_name in ["track", "slam"] {
         let refused = command(&place, &[command_name, ":bad", "--out", ":mapped"]);
         refused.assert_error(1, &["nothing could be tracked", "8 of 8 sampled frames cannot be read"]);
-        assert_eq!(differences(&before, &tree(&place.path("mapped"))), [PathBuf::new(); 0], "{command_name}");
+        assert_eq!(
+            differences(&before, &tree(&place.path("mapped"))),
+            Vec::<PathBuf>::new(),
+            "{command_name}"
+        );
     }
 }
 
@@ -226,7 +234,7 @@ fn a_run_is_written_by_one_process_at_a_time() {
         refused.assert_error(2, &["mapped", &format!("process {}", std::process::id())]);
     }
     mapped(&place, "mapped", &[]).assert_error(2, &["another process is writing it"]);
-    assert_eq!(differences(&before, &tree(&place.path("mapped"))), [PathBuf::new(); 0]);
+    assert_eq!(differences(&before, &tree(&place.path("mapped"))), Vec::<PathBuf>::new());
     drop(claimed);
     assert_eq!(command(&place, &["track", ":data", "--out", ":mapped"]).code, Some(0));
 }
@@ -238,7 +246,7 @@ fn the_report_does_not_replace_pages_of_others() {
     fs::write(&report, "<!doctype html><title>my notes</title>").unwrap();
     let before = tree(&place.path("run"));
     command(&place, &["report", ":run"]).assert_error(2, &["report.html", "did not write"]);
-    assert_eq!(differences(&before, &tree(&place.path("run"))), [PathBuf::new(); 0]);
+    assert_eq!(differences(&before, &tree(&place.path("run"))), Vec::<PathBuf>::new());
     for options in [&["--force"][..], &[]] {
         assert_eq!(command(&place, &[&["report", ":run"], options].concat()).code, Some(0));
     }
@@ -258,7 +266,7 @@ fn the_views_of_a_data_set_that_was_killed_are_replaced() {
     fs::write(place.path("new/rgb/000001.png.partial"), "half").unwrap();
     fs::write(place.path("new/.mba-lock"), "mba is writing this folder, process 1\n").unwrap();
     assert_eq!(command(&place, &synth).code, Some(0));
-    assert_eq!(differences(&whole, &tree(&place.path("new"))), [PathBuf::new(); 0]);
+    assert_eq!(differences(&whole, &tree(&place.path("new"))), Vec::<PathBuf>::new());
     assert!(matches!(whole.get(Path::new("rgb")), Some(Item::Folder)));
     command(&place, &synth).assert_error(2, &["new is not empty"]);
 }

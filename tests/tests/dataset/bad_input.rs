@@ -161,9 +161,9 @@ fn absurd_calibrations_are_named_with_line_and_value() {
         ),
         (
             "frame_rate",
-            // In the corner, 0.8 focal lengths out, 1 - 3 r^2 is negative.
-            "distortion = [-1.0, 0, 0, 0, 0]\nframe_rate",
-            "line 9: distortion = [-1, 0, .., 0], expected k1 k2 p1 p2 k3 of a lens that does not fold",
+            // At the edge, half a focal length out, 1 - 6 r^2 is negative.
+            "distortion = [-2.0, 0, 0, 0, 0]\nframe_rate",
+            "line 9: distortion = [-2, 0, .., 0], expected k1 k2 p1 p2 k3 of a lens that does not fold",
         ),
         ("frame_rate", "estimated = [\"weather\"]\nframe_rate", "line 9: unknown variant `weather`"),
         ("\"global\"", "\"sideways\"", "line 11: unknown variant `sideways`, expected `global` or `rolling`"),

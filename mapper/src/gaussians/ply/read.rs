@@ -45,13 +45,7 @@ pub fn parse_ply(path: &Path, bytes: &[u8]) -> Result<Gaussians, PlyError> {
             if values[OPACITY_LOGIT].is_nan() {
                 let (path, element, property) =
                     (path.to_owned(), element.name.clone(), NAMES[OPACITY_LOGIT].to_owned());
-                return Err(PlyError::NotFinite {
-                    path,
-                    element,
-                    index,
-                    property,
-                    found: "no number".to_owned(),
-                });
+                return Err(PlyError::NotFinite { path, element, index, property, found: "nan".to_owned() });
             }
             // Some trainers write infinity for what hides all behind it; this is as opaque in single precision.
             if values[OPACITY_LOGIT].is_infinite() {

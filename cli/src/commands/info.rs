@@ -1,5 +1,7 @@
 //! `mba info`.
 
+use std::path::Path;
+
 use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::evaluation::associate;
 use serde::Serialize;
@@ -8,10 +10,14 @@ use super::camera_facts::CameraFacts;
 use super::open;
 use crate::args::Info;
 use crate::console::Console;
+use crate::failure::bad_input;
 use crate::report::table::{pairs, percent};
 
 /// Frames whose images are read.
 const SAMPLED_FRAMES: usize = 16;
+
+/// Median depths in metres that a depth camera can have seen.
+const PLAUSIBLE_DEPTH: std::ops::RangeInclusive<f64> = 0.1..=30.0;
 
 /// What is printed.
 #[derive(Serialize)]
@@ -46,10 +52,18 @@ struct Facts {
 /// Opens a data set, looks at some of its frames and prints what is there.
 ///
 /// # Errors
-/// Bad input when the data set cannot be used.
+/// Bad input when the data set cannot be used, or when no frame of it can be read.
 pub fn run(args: &Info, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
-    console.result(&Facts::of(&dataset, survey(&dataset, SAMPLED_FRAMES)), table)
+    let survey = survey(&dataset, SAMPLED_FRAMES);
+    let (unreadable, sampled) = (survey.unreadable.len(), survey.sampled);
+    let first = survey.unreadable.first().cloned().unwrap_or_default();
+    console.result(&Facts::of(&dataset, survey), table)?;
+    if unreadable == sampled {
+        let message = format!("none of {sampled} sampled frames can be read, the first because {first}");
+        return Err(bad_input(message, "correct the lists, or restore the images"));
+    }
+    Ok(())
 }
 
 impl Facts {
@@ -98,12 +112,38 @@ fn truth_share(dataset: &Dataset, stamps: &[f64]) -> f64 {
 fn warnings(dataset: &Dataset, camera: &CameraFacts, survey: Survey) -> Vec<String> {
     let mut warnings: Vec<String> = dataset.warnings().iter().map(ToString::to_string).collect();
     warnings.extend(camera.contradictions(dataset));
-    warnings.extend(survey.unreadable);
+    warnings.extend(grouped(survey.unreadable, dataset.folder()));
+    if let Some(median) = survey.median_depth.filter(|median| !PLAUSIBLE_DEPTH.contains(median)) {
+        warnings.push(format!("the median depth is {median} m: is depth_scale in raw units per metre?"));
+    }
     if survey.without_depth > 0 {
         let (empty, sampled) = (survey.without_depth, survey.sampled);
         warnings.push(format!("{empty} of {sampled} sampled depth images hold no depth at all"));
     }
     warnings
+}
+
+/// Sentences that differ in the name of a file of `folder` only, once with their number.
+fn grouped(sentences: Vec<String>, folder: &Path) -> Vec<String> {
+    let folder = folder.display().to_string();
+    // What is left of a sentence without the words that are paths in the data set.
+    let gist = |sentence: &str| -> String {
+        sentence.split(' ').filter(|word| !word.starts_with(&folder)).collect::<Vec<_>>().join(" ")
+    };
+    let mut groups: Vec<(String, usize, String)> = Vec::new();
+    for sentence in sentences {
+        let gist = gist(&sentence);
+        match groups.iter_mut().find(|(known, ..)| *known == gist) {
+            Some((_, count, _)) => *count += 1,
+            None => groups.push((gist, 1, sentence)),
+        }
+    }
+    let more = |count| match count {
+        0 => String::new(),
+        1 => " (and 1 more like this)".to_owned(),
+        more => format!(" (and {more} more like this)"),
+    };
+    groups.into_iter().map(|(_, count, first)| first + &more(count - 1)).collect()
 }
 
 fn table(facts: &Facts) -> String {
@@ -140,4 +180,16 @@ fn distortion(coefficients: &[f64; 5]) -> String {
     }
     let [k1, k2, p1, p2, k3] = coefficients;
     format!("k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn like_sentences_are_counted() {
+        let sentences = ["/data/rgb/1.png is cut", "/data/rgb/2.png is cut", "/data/rgb/3.png is green"];
+        let grouped = grouped(sentences.map(str::to_owned).into(), Path::new("/data"));
+        assert_eq!(grouped, ["/data/rgb/1.png is cut (and 1 more like this)", "/data/rgb/3.png is green"]);
+    }
 }

@@ -11,6 +11,7 @@ pub mod info;
 pub mod map;
 pub mod mesh;
 pub mod open;
+pub mod outcome;
 pub mod render;
 pub mod report;
 pub mod slam;

@@ -174,6 +174,12 @@ impl BundleAdjustment {
         self.settings.max_gaussians = max_gaussians;
     }
 
+    /// Most Gaussians.
+    #[must_use]
+    pub fn max_gaussians(&self) -> usize {
+        self.settings.max_gaussians
+    }
+
     /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,
     /// once more, surfaces that no keyframe has a depth of.
     pub fn seed(&mut self) {

@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use image::ImageReader;
-
 use crate::bundle::BundleAdjustment;
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, read_image};
 use crate::evaluation::{DEFAULT_MAX_DT, align_poses, psnr, ssim};
 use crate::rendering::{Behind, RenderedView, ViewRenderer};
 use crate::run::{MapFigures, deblurred_path, mid_pose};
@@ -117,7 +115,7 @@ fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[Ti
 
 /// An image, or none if it cannot be read: then there is no figure for it.
 fn read(path: &Path) -> Option<Picture> {
-    let image = ImageReader::open(path).ok()?.decode().ok()?.into_rgb8();
+    let image = read_image(path).ok()?.into_rgb8();
     let size = [image.width() as usize, image.height() as usize];
     Some(Picture { size, rgb: image.into_raw() })
 }

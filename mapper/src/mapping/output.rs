@@ -11,11 +11,13 @@ use crate::rendering::{Behind, ViewRenderer};
 use crate::run::{RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
 
-/// Fills a run with the poses that it starts from, and brings its folder up to date.
+/// Fills a run with the poses that it starts from, and brings its folder up to date: from here on it replaces an
+/// earlier one.
 pub(super) fn push_tracked(writer: &mut RunWriter, frames: &Frames) -> Result<(), RunError> {
     for (exposure, record) in frames.exposures.iter().zip(&frames.records) {
         writer.push(*exposure, *record)?;
     }
+    writer.replace_earlier()?;
     writer.flush()
 }
 

@@ -7,9 +7,11 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 
 use super::keyframe_choice::{NEW_AREA, Neighbour, is_worth_it, most_dispensable, neighbours};
+use super::saved::{Growth, SavedKeyframe};
 use super::settings::SlamSettings;
 use crate::bundle::{
-    BundleAdjustment, DepthSource, FrameState, Keyframe, ObservationPyramid, PathPrior, Schedule, Sensor,
+    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, ObservationPyramid, PathPrior,
+    Schedule, Sensor,
 };
 use crate::dataset::RgbdFrame;
 use crate::evaluation::motion_of;
@@ -17,7 +19,7 @@ use crate::exposure::ExposurePath;
 use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.
-const LEVELS: usize = 2;
+pub(super) const LEVELS: usize = 2;
 
 /// The coarser resolution.
 const COARSE: usize = 1;
@@ -63,6 +65,35 @@ impl GrowingMap {
         let bundle = BundleAdjustment::new(level, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
         let random = Pcg32::new(settings.seed, 0);
         Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0, retired: 0 }
+    }
+
+    /// The map of a run that was stopped, with its keyframes.
+    pub(super) fn restored(
+        sensor: Sensor,
+        settings: &SlamSettings,
+        (keyframes, state): (Vec<Keyframe>, BundleState),
+        (max_gaussians, growth): (usize, Growth),
+    ) -> Self {
+        let mut map = Self::new(sensor, settings);
+        for (keyframe, frame) in keyframes.into_iter().zip(&state.frames) {
+            map.bundle.push(keyframe, frame.clone());
+        }
+        map.bundle.state = state;
+        map.bundle.allow(max_gaussians);
+        // Every second step draws a number.
+        map.random.advance(growth.steps as u64 / 2);
+        let Growth { effort, steps, seen, retired } = growth;
+        Self { effort, steps, seen, retired, ..map }
+    }
+
+    /// How far the map has grown.
+    pub(super) fn growth(&self) -> Growth {
+        Growth { effort: self.effort, steps: self.steps, seen: self.seen, retired: self.retired }
+    }
+
+    /// The keyframes, as a checkpoint keeps them.
+    pub(super) fn saved_keyframes(&self) -> Vec<SavedKeyframe> {
+        self.bundle.keyframes().iter().map(SavedKeyframe::from).collect()
     }
 
     /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.

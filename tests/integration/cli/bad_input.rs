@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use mba_mapper::run::Run;
 use mba_tests::small_dataset::{FRAMES, calibration};
 
 use super::{Outcome, Workplace, mba};
@@ -71,8 +72,12 @@ fn depth_that_is_all_zero_is_told_and_survived() {
     let told = info(&place);
     assert_eq!(told.code, Some(0), "{}", told.stderr);
     assert!(told.stdout.contains("8 of 8 sampled depth images hold no depth at all"), "{}", told.stdout);
-    let summary = place.track().json();
-    assert_eq!(summary["frames"]["total"], FRAMES);
+    let outcome = place.track();
+    outcome
+        .assert_error(1, &["nothing could be tracked", "8 of 8 sampled depth images hold no depth at all"]);
+    // What was tried is there to be looked at.
+    let run = Run::open(&place.path("run")).unwrap();
+    assert_eq!((run.summary.complete, run.frames.len()), (true, FRAMES));
 }
 
 #[test]

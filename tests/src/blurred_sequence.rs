@@ -113,7 +113,9 @@ impl BlurredSequence {
         run_slam(dataset, settings, &self.path(name), self.describe(), |_| ()).expect("a finished run")
     }
 
-    fn describe(&self) -> RunSettings {
+    /// What a run of the sequence says about itself.
+    #[must_use]
+    pub fn describe(&self) -> RunSettings {
         RunSettings {
             program: "test".to_owned(),
             dataset: self.dataset.folder().display().to_string(),

@@ -122,7 +122,9 @@ impl BlurredSequence {
         OutputFolder::for_run(&self.path(name), &Permission::default()).expect("a folder for a run")
     }
 
-    fn describe(&self) -> RunSettings {
+    /// What a run of the sequence says about itself.
+    #[must_use]
+    pub fn describe(&self) -> RunSettings {
         RunSettings {
             program: "test".to_owned(),
             dataset: self.dataset.folder().display().to_string(),

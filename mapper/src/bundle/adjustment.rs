@@ -195,11 +195,11 @@ impl BundleAdjustment {
 
     /// Adds what keyframe `k` sees and the map does not cover.
     pub fn seed_from(&mut self, k: usize, source: DepthSource) {
-        let path = &self.state.frames[k].path;
-        let world_from_camera = path.mid();
+        let FrameState { path, log_gain, .. } = &self.state.frames[k];
+        let (world_from_camera, gain) = (path.mid(), log_gain.exp() as f32);
         let Keyframe { index, observation, .. } = &self.keyframes[k];
         let seen = seen_at_once(observation.level(0), path);
-        let view = SeedView { index: *index, seen: &seen, world_from_camera, source };
+        let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
         self.state.map.model_mut().seed(&mut self.bench, &view, self.settings.max_gaussians);
     }
 

@@ -6,6 +6,7 @@
 
 mod adam;
 mod adjustment;
+mod brightness;
 mod density;
 mod display;
 mod engine;
@@ -25,6 +26,7 @@ mod seeding;
 mod smooth_depth;
 
 pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport};
+pub(crate) use brightness::{NOTICEABLE, Placed, log_brightness};
 pub use display::DisplayCurve;
 pub use engine::{Engine, Exposure, ExposureLoss};
 pub use field_map::FieldMap;

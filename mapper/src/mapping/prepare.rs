@@ -9,7 +9,10 @@ use rayon::prelude::*;
 use super::choice::choose_keyframes;
 use super::evidence::FrameEvidence;
 use super::{MapError, MapSettings};
-use crate::bundle::{BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor};
+use crate::bundle::{
+    BundleAdjustment, FrameState, Keyframe, NOTICEABLE, ObservationPyramid, PathPrior, Placed, Sensor,
+    log_brightness,
+};
 use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
 };
@@ -182,9 +185,31 @@ pub(super) fn bundle(
         let reason = frames.warnings.last().cloned().unwrap_or_else(|| "all frames are lost".to_owned());
         return Err(MapError::NoKeyframe(reason));
     }
-    let states = keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
+    let mut states: Vec<FrameState> =
+        keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
+    set_gains(&sensor, &keyframes, &mut states);
     let pixels = sensor.camera.width * sensor.camera.height;
     Ok(BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(pixels), keyframes, states))
+}
+
+/// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.
+/// The first keyframe says how bright the map is.
+fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState]) {
+    let ratios: Vec<f64> = (1..keyframes.len())
+        .into_par_iter()
+        .map(|k| {
+            let [before, here] = [k - 1, k].map(|k| Placed {
+                seen: keyframes[k].observation.level(1),
+                world_from_camera: states[k].path.mid(),
+            });
+            log_brightness(&sensor.inverse_response, before, here).unwrap_or(0.0)
+        })
+        .collect();
+    let mut log_gains = vec![0.0];
+    ratios.iter().for_each(|ratio| log_gains.push(log_gains[log_gains.len() - 1] + ratio));
+    if log_gains.iter().any(|log_gain| log_gain.abs() > NOTICEABLE) {
+        states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain);
+    }
 }
 
 /// Reads a frame.

@@ -9,13 +9,13 @@ use rayon::prelude::*;
 use super::backward::{SplatSums, TileGradient, backward};
 use super::bin::Bins;
 use super::forward::{TileCounts, TilePixels, TileSplats, composite};
-use super::image::{RasterImage, RowPart, TileRows, ViewTiles, load_gradient, store_mean, store_weighted};
+use super::image::{RasterImage, TileRows, ViewTiles, load_gradient, store_mean};
 use super::lanes::ViewNumbers;
 use super::order::{NO_RANK, Order};
 use super::pose::ViewGradient;
 use super::project::{Projected, project};
 use super::project_backward::{GradientRange, SplatGradients, ViewSums, project_backward};
-use super::tile::{TILE_HEIGHT, TileGrid};
+use super::tile::TileGrid;
 use super::view::RasterView;
 use crate::gaussians::{Gaussians, PARAMETERS};
 
@@ -35,11 +35,11 @@ pub struct RasterScratch {
     view: ViewNumbers,
     /// Columns and rows of the image, of which the view may have a band only.
     size: [usize; 2],
-    background: [f32; 3],
+    pub(super) background: [f32; 3],
     projected: Vec<Projected>,
     order: Order,
-    bins: Bins,
-    tiles: Vec<TilePixels>,
+    pub(super) bins: Bins,
+    pub(super) tiles: Vec<TilePixels>,
     sums: Vec<SplatSums>,
     pose_sums: PoseSums,
 }
@@ -79,16 +79,6 @@ impl ColourShare<'_> {
 impl ViewShare<'_> {
     /// The image is the view.
     const WHOLE: Self = Self { colour: ColourShare::Same(1.0), geometry: true };
-}
-
-/// What a view of some rows of tiles gives to an image.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct BandView<'a> {
-    pub(crate) scratch: &'a RasterScratch,
-    /// Its weight in the colour of every row of the image; empty if it has none.
-    pub(crate) weights: &'a [f32],
-    /// Whether depth and alpha of its rows are those of the image.
-    pub(crate) geometry: bool,
 }
 
 /// Gradients of a loss by Gaussians, summed over views.
@@ -323,15 +313,6 @@ impl Rasterizer {
         store_rows(views, 0..grid.down, image.tile_rows());
     }
 
-    /// The weighted sum of the colours of views of an image of `size` columns and rows, with depth and alpha of the
-    /// view that has them for each row of tiles.
-    pub(crate) fn store_bands(&self, size: [usize; 2], views: &[BandView<'_>], image: &mut RasterImage) {
-        let [width, height] = size;
-        image.resize(width, height);
-        let grid = TileGrid::new(width, height);
-        store_band_rows(views, &grid, 0..grid.down, image.tile_rows());
-    }
-
     fn composite_tiles<const DEPTH: bool>(&self, scratch: &mut RasterScratch) {
         let RasterScratch { bins, order, tiles, .. } = scratch;
         tiles.resize(bins.grid.len(), TilePixels::default());
@@ -460,33 +441,6 @@ fn store_rows(views: &[RasterScratch], down: Range<usize>, mut rows: TileRows) {
         let tiles =
             |view: usize| ViewTiles { tiles: &views[view].tiles, background: &views[view].background };
         store_mean(&tiles, views.len(), &views[0].bins.grid, down.start, &mut rows);
-    }
-}
-
-/// Stores the weighted sum of views in rows of tiles.
-fn store_band_rows(views: &[BandView<'_>], grid: &TileGrid, down: Range<usize>, mut rows: TileRows) {
-    if down.len() > 1 {
-        let middle = down.start + down.len() / 2;
-        let (upper, lower) = rows.split_at(middle - down.start);
-        rayon::join(
-            || store_band_rows(views, grid, down.start..middle, upper),
-            || store_band_rows(views, grid, middle..down.end, lower),
-        );
-    } else if !down.is_empty() {
-        let parts: Vec<RowPart<'_>> = views.iter().filter_map(|view| view.part(grid, down.start)).collect();
-        store_weighted(&parts, grid, &mut rows);
-    }
-}
-
-impl<'a> BandView<'a> {
-    /// What the view gives to row `down` of the tiles of the image, if it has that row.
-    fn part(&self, grid: &TileGrid, down: usize) -> Option<RowPart<'a>> {
-        let RasterScratch { bins, tiles, background, .. } = self.scratch;
-        let row = down.checked_sub(bins.grid.above).filter(|row| *row < bins.grid.down)?;
-        let top = down * TILE_HEIGHT;
-        let weights = core::array::from_fn(|row| self.weights.get(top + row).copied().unwrap_or(0.0));
-        let tiles = &tiles[row * grid.across..(row + 1) * grid.across];
-        Some(RowPart { tiles, background, weights, geometry: self.geometry })
     }
 }
 

@@ -10,8 +10,13 @@ use super::keyframe_choice::{NEW_AREA, Neighbour, is_worth_it, most_dispensable,
 use super::saved::{Growth, SavedKeyframe};
 use super::settings::SlamSettings;
 use crate::bundle::{
+<<<<<<< HEAD
     BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, ObservationPyramid, PathPrior,
     Schedule, Sensor,
+=======
+    BundleAdjustment, DepthSource, FrameState, Keyframe, NOTICEABLE, ObservationPyramid, PathPrior, Placed,
+    Schedule, Sensor, log_brightness,
+>>>>>>> w-mapper
 };
 use crate::dataset::RgbdFrame;
 use crate::evaluation::motion_of;
@@ -111,7 +116,7 @@ impl GrowingMap {
         let path = if self.settings.blur { path } else { ExposurePath::still(path.mid()) };
         let prior = PathPrior { middle: path.ends.mid(), motion: None };
         let mut state = FrameState::new(path);
-        state.log_gain = near.first().map_or(0.0, |near| self.bundle.state.frames[near.keyframe].log_gain);
+        state.log_gain = near.first().map_or(0.0, |near| self.log_gain(near.keyframe, &observation, &state));
         self.bundle.push(Keyframe::new(image.index, observation, prior), state);
         self.seed();
         if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
@@ -121,6 +126,15 @@ impl GrowingMap {
             self.retired += 1;
         }
         true
+    }
+
+    /// Logarithm of the gain of a new frame, told from keyframe `k` near it.
+    fn log_gain(&self, k: usize, observation: &ObservationPyramid, frame: &FrameState) -> f64 {
+        let (known, state) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
+        let there = Placed { seen: known.observation.level(COARSE), world_from_camera: state.path.mid() };
+        let here = Placed { seen: observation.level(COARSE), world_from_camera: frame.path.mid() };
+        let ratio = log_brightness(&self.sensor.inverse_response, there, here).unwrap_or(0.0);
+        state.log_gain + if ratio.abs() > NOTICEABLE { ratio } else { 0.0 }
     }
 
     /// The path over all the time in which anything of a frame was measured.

@@ -336,6 +336,7 @@ mod tests {
             residual: if lost { f64::NAN } else { 0.015625 },
             inliers: 0.75,
             gain: 1.0,
+            reason: None,
         };
         (exposure, record)
     }

@@ -10,8 +10,8 @@ use super::keyframe_choice::{NEW_AREA, Neighbour, is_worth_it, most_dispensable,
 use super::saved::{Growth, SavedKeyframe};
 use super::settings::SlamSettings;
 use crate::bundle::{
-    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, ObservationPyramid, PathPrior,
-    Placed, Schedule, Sensor, log_brightness,
+    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, ObservationPyramid,
+    PathPrior, Placed, Schedule, Sensor, log_brightness,
 };
 use crate::dataset::RgbdFrame;
 use crate::evaluation::motion_of;

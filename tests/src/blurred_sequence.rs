@@ -118,7 +118,9 @@ impl BlurredSequence {
     }
 
     /// The folder `name` for a run.
-    fn output(&self, name: &str) -> OutputFolder {
+    /// The folder of a run of that name beside the data set.
+    #[must_use]
+    pub fn output(&self, name: &str) -> OutputFolder {
         OutputFolder::for_run(&self.path(name), &Permission::default()).expect("a folder for a run")
     }
 

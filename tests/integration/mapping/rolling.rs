@@ -1,5 +1,7 @@
 //! Cameras that expose rows one after the other, with depth of another time and a lens that darkens the corners.
 
+use std::ops::ControlFlow;
+
 use mba_mapper::bundle::MapKind;
 use mba_mapper::dataset::{Calibration, Readout, Vignetting};
 use mba_mapper::mapping::{MapSettings, map_dataset};
@@ -24,8 +26,9 @@ fn mapped(sequence: &BlurredSequence, known: Calibration, kind: MapKind) -> Summ
     let dataset = sequence.dataset.clone().with_calibration(known).expect("a valid calibration");
     let run: Run = sequence.run_of("run", sequence.truth());
     let settings = MapSettings { kind, ..MapSettings::default() };
-    let out = sequence.path("mapped");
-    map_dataset(&dataset, &run, &settings, &out, false, sequence.describe(), |_| ()).expect("a map")
+    let out = sequence.output("mapped");
+    let go_on = |_| ControlFlow::Continue(());
+    map_dataset(&dataset, &run, &settings, out, false, sequence.describe(), go_on).expect("a map")
 }
 
 fn rolling_sequence() -> BlurredSequence {

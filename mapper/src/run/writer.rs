@@ -369,7 +369,7 @@ mod tests {
         assert!(run.frames[2].residual.is_nan());
         let header = fs::read_to_string(folder.path().join("frames.csv")).unwrap();
         assert!(header.starts_with(
-            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain\n"
+            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain,reason\n"
         ));
     }
 

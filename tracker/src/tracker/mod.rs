@@ -1,14 +1,17 @@
 //! The tracker: frames in, poses at shutter opening and closing out.
 
+mod bootstrap;
 mod bound;
 mod coarse_to_fine;
 mod config;
 mod frame;
+mod hindsight;
 mod history;
 mod keyframe_path;
 mod outside;
 mod policy;
 mod recovery;
+mod reference;
 mod result;
 mod track;
 

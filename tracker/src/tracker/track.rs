@@ -1,14 +1,12 @@
 //! The tracking loop.
 
-use core::mem;
-
 use fearless_simd::Level;
-use nalgebra::{Vector3, Vector6};
+use nalgebra::Vector3;
 
 use super::coarse_to_fine::{Aligned, FrameTask, score};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::{Frame, GyroReading};
-use super::history::{Motion, rotated};
+use super::history::Motion;
 use super::keyframe_path::{PathError, PathRate};
 use super::policy::{Evidence, Typical, fits_badly, is_blind, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
@@ -26,9 +24,6 @@ use crate::transfer::BrightnessModel;
 use crate::work::Work;
 use crate::workspace::Arena;
 
-/// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
-const MIN_STRENGTH: f32 = 0.02;
-
 /// Fewest keypoints on the finest level, and least share of measured depth, to start from.
 const MIN_START_KEYPOINTS: usize = 24;
 const MIN_START_DEPTH: f32 = 0.1;
@@ -43,27 +38,11 @@ const START_INVERSE_DEPTH: core::ops::Range<f32> = 0.01..20.0;
 /// with damaged depth.
 const MAX_LOST_AT_START: usize = 2;
 
-/// Pixels by which the motion during an exposure may exceed that between frames: twice the error of a good blur length.
-const IMPOSSIBLE_MARGIN: f64 = 1.5;
-
-/// Pixels of expected blur from which its direction says which way time runs.
-const DIRECTED: f64 = 1.0;
-
 /// Largest time between a colour image and its depth image, seconds.
 const MAX_DEPTH_OFFSET: f64 = 0.2;
 
-/// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
-const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
-
-/// Standard deviation of a keyframe's velocity and of one between mid poses, as a shear in pixels over the path of a frame.
-const KEYFRAME_SHEAR: f64 = 2.0;
-const MID_POSE_SHEAR: f64 = 0.3;
-
-/// Alignments of the second frame with a first one whose own shear becomes known by them.
-const BOOTSTRAP_ROUNDS: usize = 2;
-
 /// The linear motion during the exposure of the middle row.
-fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajectory {
+pub(super) fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajectory {
     if timing.reaches_outside() {
         path.between(0.5 - 0.5 * timing.exposure, 0.5 + 0.5 * timing.exposure)
     } else {
@@ -74,43 +53,43 @@ fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajecto
 /// Estimates camera poses at shutter opening and closing, frame by frame.
 #[derive(Debug)]
 pub struct Tracker<'m> {
-    simd: Level,
+    pub(super) simd: Level,
     pub(super) config: TrackerConfig,
     pub(super) luminance: LuminanceTable,
-    pyramid: GreyPyramid<'m>,
-    depth: InverseDepthMap<'m>,
-    depth_share: f32,
+    pub(super) pyramid: GreyPyramid<'m>,
+    pub(super) depth: InverseDepthMap<'m>,
+    pub(super) depth_share: f32,
     pub(super) keyframe: Keyframe<'m>,
     pub(super) recent: RecentKeyframes<'m>,
-    scratch: AlignScratch<'m>,
-    deblur: DeblurScratch<'m>,
-    rectify: RectifyScratch<'m>,
+    pub(super) scratch: AlignScratch<'m>,
+    pub(super) deblur: DeblurScratch<'m>,
+    pub(super) rectify: RectifyScratch<'m>,
     /// When the parts of the current frame were measured, along a path of `span` seconds.
-    timing: FrameTiming,
-    span: f64,
+    pub(super) timing: FrameTiming,
+    pub(super) span: f64,
     /// Seconds that the path of the keyframe's frame spans.
-    keyframe_span: f64,
+    pub(super) keyframe_span: f64,
     /// What the gyroscope said while the keyframe was exposed.
-    keyframe_gyro: Option<GyroReading>,
-    gyro: Option<GyroReading>,
+    pub(super) keyframe_gyro: Option<GyroReading>,
+    pub(super) gyro: Option<GyroReading>,
     /// What the gyroscope says of a camera at rest, rad/s: the running mean of its difference to the poses.
-    gyro_bias: Vector3<f64>,
+    pub(super) gyro_bias: Vector3<f64>,
     /// Running number of the last frame that was aligned, and what the next one taught about it.
-    last_index: usize,
-    late_revision: Option<Revision>,
+    pub(super) last_index: usize,
+    pub(super) late_revision: Option<Revision>,
     /// Whether any frame was aligned since the start, and how many were lost before.
-    established: bool,
-    lost_at_start: usize,
+    pub(super) established: bool,
+    pub(super) lost_at_start: usize,
     /// What is known about the error of the keyframe's path.
-    path_error: PathError,
+    pub(super) path_error: PathError,
     /// Motion in the world; `None` before the first usable frame.
     pub(super) motion: Option<Motion>,
     pub(super) brightness: BrightnessModel,
-    typical: Typical,
+    pub(super) typical: Typical,
     pub(super) last_timestamp: f64,
     pub(super) frames: usize,
     /// What the current frame took so far.
-    work: Work,
+    pub(super) work: Work,
 }
 
 impl<'m> Tracker<'m> {
@@ -199,7 +178,7 @@ impl<'m> Tracker<'m> {
         Ok(result)
     }
 
-    fn pixels(&self) -> u64 {
+    pub(super) fn pixels(&self) -> u64 {
         (self.config.camera.width * self.config.camera.height) as u64
     }
 
@@ -211,6 +190,12 @@ impl<'m> Tracker<'m> {
         self.typical = Typical::default();
         self.last_timestamp = f64::NEG_INFINITY;
         self.frames = 0;
+        self.last_index = 0;
+        self.late_revision = None;
+        self.established = false;
+        self.lost_at_start = 0;
+        self.gyro_bias = Vector3::zeros();
+        self.keyframe_gyro = None;
     }
 
     fn check(&self, frame: &Frame) -> Result<(), FrameError> {
@@ -334,120 +319,13 @@ impl<'m> Tracker<'m> {
         result
     }
 
-    /// Aligns the first frame after the first keyframe, whose own motion is unknown.
-    ///
-    /// Both are blurred alike, so they are aligned as they are; the motion between them then deblurs the keyframe,
-    /// and the frame is aligned again.
-    fn bootstrap(&mut self, frame: &Frame, motion: &Motion) -> (Aligned, Option<Revision>) {
-        let timing = self.timing;
-        // Rows and depth are sheared alike in both, as long as neither is corrected.
-        self.timing = FrameTiming::GLOBAL;
-        let first = self.align(frame, motion, false, None);
-        self.timing = timing;
-        if self.judge(&first.outcome, motion, frame).0 == FrameStatus::Lost {
-            return (first, None);
-        }
-        let dt = frame.timestamp - motion.timestamp;
-        let mid = first.outcome.estimate.keyframe_from_camera.mid();
-        let rate = RigidTransform::identity().tangent_to(&mid) / dt;
-        self.set_keyframe_path(self.path_of_keyframe(&rate, &Vector6::zeros()));
-        let mut second = self.align(frame, motion, self.config.align.blur, Some(mid));
-        let refined = self.rate_before(&second.outcome.estimate, dt);
-        let mut path = self.path_of_keyframe(&refined, &Vector6::zeros());
-        if timing.reaches_outside() {
-            (second, path) = self.align_each_other(frame, motion, second);
-        } else {
-            self.keyframe.keyframe_from_camera = Some(path);
-        }
-        let exposure = exposure_of(&path, &self.keyframe.timing);
-        let revision = Revision {
-            index: self.keyframe.frame_index,
-            world_from_camera: exposure.seen_from(&self.keyframe.world_from_keyframe),
-            world_from_mid: self.keyframe.world_from_keyframe,
-            blur: self.blur_length(&exposure),
-        };
-        (second, Some(revision))
-    }
-
-    /// Velocity of the keyframe, per second, when a frame `dt` seconds later was aligned with `estimate`: the mean of the
-    /// velocities at both is that of the motion between them.
-    fn rate_before(&self, estimate: &Estimate, dt: f64) -> Vector6<f64> {
-        let between = RigidTransform::identity().tangent_to(&estimate.keyframe_from_camera.mid()) / dt;
-        between * 2.0 - estimate.keyframe_from_camera.motion() / self.span
-    }
-
-    /// The keyframe's path for a velocity and an acceleration at its middle, per second.
-    fn path_of_keyframe(&self, rate: &Vector6<f64>, acceleration: &Vector6<f64>) -> BowedTrajectory {
-        let span = self.keyframe_span;
-        let linear = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &(rate * span));
-        BowedTrajectory { linear, bow: acceleration * (0.5 * span * span) }
-    }
-
-    /// Aligns the frame with the keyframe and the keyframe with the frame in turn, until each has been given one time with
-    /// a path that was measured against the other. Returns the alignment of the frame and the keyframe's path.
-    fn align_each_other(
-        &mut self,
-        frame: &Frame,
-        motion: &Motion,
-        first: Aligned,
-    ) -> (Aligned, BowedTrajectory) {
-        let mut of_frame = first;
-        let mut of_keyframe =
-            BowedTrajectory::without_bow(ExposureTrajectory::still(RigidTransform::identity()));
-        for _ in 0..BOOTSTRAP_ROUNDS {
-            let keyframe_from_mid = of_frame.outcome.estimate.keyframe_from_camera.mid();
-            let mid_from_keyframe = keyframe_from_mid.inverse();
-            self.exchange_with_keyframe(of_frame.outcome.estimate.path().seen_from(&mid_from_keyframe));
-            let back = Frame {
-                timestamp: motion.timestamp,
-                angular_velocity: None,
-                gyro: self.keyframe_gyro,
-                ..*frame
-            };
-            let from_frame = Motion::still(frame.timestamp, RigidTransform::identity());
-            let world_from_frame = self.keyframe.world_from_keyframe.compose(&keyframe_from_mid);
-            let world_from_keyframe =
-                core::mem::replace(&mut self.keyframe.world_from_keyframe, world_from_frame);
-            let from_frame = from_frame.seen_from(&world_from_frame);
-            let reverse = self.align(&back, &from_frame, self.config.align.blur, Some(mid_from_keyframe));
-            let frame_from_keyframe = reverse.outcome.estimate.path();
-            of_keyframe = frame_from_keyframe.seen_from(&frame_from_keyframe.linear.mid().inverse());
-            self.keyframe.world_from_keyframe = world_from_keyframe;
-            self.exchange_with_keyframe(of_keyframe);
-            let start = frame_from_keyframe.linear.mid().inverse();
-            of_frame = self.align(frame, motion, self.config.align.blur, Some(start));
-        }
-        (of_frame, of_keyframe)
-    }
-
-    /// Makes the current frame, which moved along `path` seen from its own mid pose, the keyframe, and the keyframe as it
-    /// was captured the current frame.
-    fn exchange_with_keyframe(&mut self, path: BowedTrajectory) {
-        let keyframe = &mut self.keyframe;
-        self.rectify.restore(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
-        keyframe.pyramid.reduce();
-        mem::swap(&mut self.pyramid, &mut keyframe.pyramid);
-        mem::swap(&mut self.depth, &mut keyframe.depth);
-        mem::swap(&mut self.timing, &mut keyframe.timing);
-        mem::swap(&mut self.span, &mut self.keyframe_span);
-        self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
-        keyframe.restart_surface();
-        self.set_keyframe_path(path);
-    }
-
-    fn set_keyframe_path(&mut self, path: BowedTrajectory) {
-        self.keyframe.keyframe_from_camera = Some(path);
-        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
-        self.sharpen_keyframe();
-    }
-
     /// Whether the motion of a frame around its middle matters: it blurs the frame, or its parts have different times.
-    fn path_is_modelled(&self) -> bool {
+    pub(super) fn path_is_modelled(&self) -> bool {
         (self.config.align.blur && self.timing.exposure * self.span > 0.0) || self.timing.reaches_outside()
     }
 
     /// Aligns the current frame with the keyframe; from `start` alone if it is given.
-    fn align(
+    pub(super) fn align(
         &mut self,
         frame: &Frame,
         world_motion: &Motion,
@@ -496,7 +374,12 @@ impl<'m> Tracker<'m> {
         aligned
     }
 
-    fn judge(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> (FrameStatus, Option<Doubt>) {
+    pub(super) fn judge(
+        &self,
+        outcome: &LevelOutcome,
+        motion: &Motion,
+        frame: &Frame,
+    ) -> (FrameStatus, Option<Doubt>) {
         judge(outcome, &self.evidence(outcome, motion, frame), &self.typical)
     }
 
@@ -582,128 +465,6 @@ impl<'m> Tracker<'m> {
         result
     }
 
-    /// Judges the exposure motion of the last frame, now that the poses on both sides of it are known.
-    ///
-    /// A shutter is open for at most the time between two frames, so that the picture cannot move farther during an
-    /// exposure than to the farther of its neighbours; and a blurred picture does not tell the direction of time. What is
-    /// impossible is replaced by the motion between the neighbours, what fits better reversed is reversed.
-    fn revise_last(
-        &self,
-        frame: &Frame,
-        motion: &Motion,
-        world_from_mid: &RigidTransform,
-    ) -> Option<Revision> {
-        let measured =
-            motion.within_exposure.filter(|_| motion.interval.is_finite() && motion.exposure > 0.0)?;
-        let dt = frame.timestamp - motion.timestamp;
-        let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
-        let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
-        let [within, farther_before, farther_after, of_slope] = [
-            measured * motion.exposure,
-            motion.between_frames * motion.interval,
-            next * dt,
-            slope * motion.exposure,
-        ]
-        .map(|way| self.way_in_pixels(&way));
-        let rate = if within > farther_before.max(farther_after) + IMPOSSIBLE_MARGIN {
-            slope
-        } else if !self.timing.is_rolling()
-            && of_slope > DIRECTED
-            && self.way_in_pixels(&(measured + slope)) < self.way_in_pixels(&(measured - slope))
-        {
-            -measured
-        } else {
-            return None;
-        };
-        let world_from_camera =
-            ExposureTrajectory::from_mid_and_motion(&motion.reference_from_mid, &(rate * motion.exposure));
-        let seen = world_from_camera.seen_from(&self.keyframe.world_from_keyframe.inverse());
-        Some(Revision {
-            index: self.last_index,
-            world_from_camera,
-            world_from_mid: motion.reference_from_mid,
-            blur: self.blur_length(&seen),
-        })
-    }
-
-    /// About how far a motion (translation, rotation) moves the picture.
-    fn way_in_pixels(&self, way: &Vector6<f64>) -> f64 {
-        let rho = typical_inverse_depth(self.keyframe.finest_keypoints());
-        let (shift, turn) = (way.fixed_rows::<3>(0).norm() * rho, way.fixed_rows::<3>(3).norm());
-        self.config.camera.fx * crate::math::sqrt(shift * shift + turn * turn)
-    }
-
-    /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
-    /// correction of the keyframe's velocity, per second in the keyframe, when it is time for one.
-    fn observe_path_error(
-        &mut self,
-        frame: &Frame,
-        motion: &Motion,
-        world_from_mid: &RigidTransform,
-    ) -> Option<PathRate> {
-        let path_rate = motion.within_exposure.filter(|_| self.keyframe.timing.is_rolling())?;
-        let dt = frame.timestamp - motion.timestamp;
-        let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
-        if !motion.interval.is_finite() {
-            return None;
-        }
-        let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
-        let bend = next - motion.between_frames;
-        let between = 0.5 * (dt + motion.interval);
-        let mut sigma = self.path_sigma(MID_POSE_SHEAR, self.span);
-        for i in 0..12 {
-            let bend = bend.fixed_rows::<3>(i / 3 % 2 * 3).norm();
-            sigma[i] += if i < 6 { 0.3 * bend } else { 0.3 * bend / between };
-        }
-        let keyframe_from_world = self.keyframe.world_from_keyframe.inverse();
-        let mut difference = PathRate::zeros();
-        let velocity = rotated(&keyframe_from_world, &(path_rate - slope));
-        let acceleration = rotated(&keyframe_from_world, &(motion.acceleration - bend / between));
-        difference.fixed_rows_mut::<6>(0).copy_from(&velocity);
-        difference.fixed_rows_mut::<6>(6).copy_from(&acceleration);
-        self.path_error.observe(&difference, &sigma)
-    }
-
-    /// Standard deviations of a velocity that moves the picture by `pixels` within `span` seconds, and of an acceleration
-    /// that moves it by as much at both ends of them.
-    fn path_sigma(&self, pixels: f64, span: f64) -> PathRate {
-        let span = span.max(1e-6);
-        let angle = pixels / self.config.camera.fx / span;
-        let shift = angle / typical_inverse_depth(self.keyframe.finest_keypoints()).max(0.02);
-        PathRate::from_fn(|i, _| {
-            let of_velocity = if i / 3 % 2 == 0 { shift } else { angle };
-            if i < 6 { of_velocity } else { of_velocity * 8.0 / span }
-        })
-    }
-
-    /// Changes the keyframe's velocity by `correction` and shears picture and depth anew.
-    fn correct_keyframe_path(&mut self, correction: &PathRate) {
-        let Some(old) = self.keyframe.keyframe_from_camera else { return };
-        let span = self.keyframe_span;
-        let motion = old.linear.motion() + correction.fixed_rows::<6>(0) * span;
-        let bow = old.bow + correction.fixed_rows::<6>(6) * (0.5 * span * span);
-        let mid = RigidTransform::identity();
-        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), bow };
-        let depth_time = 0.5 + self.keyframe.timing.depth_time;
-        let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
-        self.keyframe.keyframe_from_camera = Some(path);
-        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
-        self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
-        self.keyframe.refit_surface();
-        let pixels = &mut *self.keyframe.pyramid.levels[0].pixels;
-        self.rectify.rectify_image(
-            &path,
-            &self.keyframe.timing,
-            &self.config.camera,
-            pixels,
-            &self.keyframe.depth,
-        );
-        self.keyframe.pyramid.reduce();
-        if !self.deblur_keyframe(&path) {
-            self.select_keypoints();
-        }
-    }
-
     /// Holds the last good pose.
     fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned, doubt: Doubt) -> FrameResult {
         let held = Motion { between_frames: motion.between_frames * 0.5, within_exposure: None, ..*motion };
@@ -749,93 +510,7 @@ impl<'m> Tracker<'m> {
         }
     }
 
-    /// Makes the current frame the keyframe.
-    fn promote(
-        &mut self,
-        world_from_keyframe: &RigidTransform,
-        keyframe_from_camera: Option<BowedTrajectory>,
-        blur: f32,
-    ) {
-        mem::swap(&mut self.pyramid, &mut self.keyframe.pyramid);
-        mem::swap(&mut self.depth, &mut self.keyframe.depth);
-        self.keyframe.world_from_keyframe = *world_from_keyframe;
-        self.keyframe.keyframe_from_camera = keyframe_from_camera;
-        self.keyframe.timing = self.timing;
-        self.keyframe_span = self.span;
-        self.keyframe_gyro = self.gyro;
-        self.path_error = PathError::unknown(&self.path_sigma(KEYFRAME_SHEAR, self.span));
-        self.keyframe.blur = blur;
-        self.keyframe.frame_index = self.frames;
-        self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
-        self.keyframe.restart_surface();
-        self.brightness = BrightnessModel::default();
-        let deblurred = self.sharpen_keyframe();
-        if !deblurred {
-            self.select_keypoints();
-        }
-    }
-
-    /// Gives the keyframe one time and deblurs it, with its own motion, and selects its keypoints; `false` if there is
-    /// nothing to do.
-    fn sharpen_keyframe(&mut self) -> bool {
-        self.work.image_pixels += self.pixels();
-        let Some(path) = self.keyframe.keyframe_from_camera else { return false };
-        let timing = self.keyframe.timing;
-        if timing.reaches_outside() {
-            let keyframe = &mut self.keyframe;
-            self.rectify.rectify(
-                &path,
-                &timing,
-                &self.config.camera,
-                keyframe.pyramid.levels[0].pixels,
-                &mut keyframe.depth,
-            );
-            keyframe.restart_surface();
-            keyframe.pyramid.reduce();
-        }
-        if self.deblur_keyframe(&path) {
-            return true;
-        }
-        if timing.reaches_outside() {
-            self.select_keypoints();
-        }
-        timing.reaches_outside()
-    }
-
-    /// Deblurs the keyframe with its path and selects its keypoints; `false` if it is not worth it.
-    fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
-        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
-        if self.config.reference == ReferenceMode::Raw || !worth {
-            return false;
-        }
-        let Some(typical) = self.keyframe.depth.mean() else { return false };
-        let longest = self.deblur.flow.fill(
-            path,
-            &self.keyframe.timing,
-            &self.config.camera,
-            &self.keyframe.planes,
-            self.config.surface_level,
-            typical,
-        );
-        let image = &mut self.keyframe.pyramid.levels[0];
-        self.deblur.capture(image.pixels);
-        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
-        self.work.blur_taps += report.taps;
-        self.keyframe.pyramid.reduce();
-        self.select_keypoints();
-        true
-    }
-
-    pub(super) fn select_keypoints(&mut self) {
-        self.keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
-    }
-
-    /// Remembers the coarse part of the keyframe for recovery before it is replaced.
-    pub(super) fn keep_keyframe(&mut self) {
-        self.recent.remember(&self.keyframe, self.config.surface_level);
-    }
-
-    fn blur_length(&self, keyframe_from_camera: &ExposureTrajectory) -> f32 {
+    pub(super) fn blur_length(&self, keyframe_from_camera: &ExposureTrajectory) -> f32 {
         blur_length(keyframe_from_camera, self.keyframe.finest_keypoints(), &self.config.camera)
     }
 }

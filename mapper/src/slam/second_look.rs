@@ -54,7 +54,7 @@ impl SecondLook {
         };
         let result = { align }().ok()?;
         (result.status == FrameStatus::Ok && result.inliers > MIN_INLIERS)
-            .then(|| Sighting { world_from_camera: result.world_from_mid, residual: result.residual })
+            .then_some(Sighting { world_from_camera: result.world_from_mid, residual: result.residual })
     }
 
     /// A keyframe as a sharp view: deblurred with its own motion.

@@ -204,7 +204,8 @@ impl<'m> Tracker<'m> {
             return Err(FrameError::Exposure { got: frame.exposure });
         }
         let apart = frame.depth_timestamp - frame.timestamp;
-        if self.config.readout.depth_apart && !(apart.abs() <= MAX_DEPTH_OFFSET) {
+        let belongs = apart.abs() <= MAX_DEPTH_OFFSET;
+        if self.config.readout.depth_apart && !belongs {
             return Err(FrameError::DepthTimestamp { frame: frame.timestamp, got: frame.depth_timestamp });
         }
         if !(frame.timestamp.is_finite() && frame.timestamp > self.last_timestamp) {

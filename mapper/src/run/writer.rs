@@ -27,7 +27,7 @@ const FRAMES_THAT_PROVE: usize = 2;
 
 /// Collects the results of a run and keeps its folder up to date.
 ///
-/// An earlier run in the folder stays until this one has found [`FRAMES_THAT_PROVE`] frames or is finished. When this is
+/// An earlier run in the folder stays until this one has found two frames or is finished. When this is
 /// dropped before [`Self::finish`], e.g. because of an error, what was pushed is still written, marked as incomplete.
 #[derive(Debug)]
 pub struct RunWriter {

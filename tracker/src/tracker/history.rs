@@ -240,6 +240,51 @@ mod tests {
     }
 
     #[test]
+    fn a_wrong_exposure_motion_dies_out_within_three_frames() {
+        // Constant velocity. A blurred picture accepts whatever it is told with either sign: what is expected is measured.
+        let rate = Vector6::new(0.3, -0.1, 0.2, 0.1, -0.4, 0.2);
+        let pose = |k: usize| RigidTransform::identity().perturbed(&(rate * (k as f64 * DT)));
+        let wrong = rate * 4.0;
+        let mut motion = Motion {
+            between_frames: rate,
+            interval: DT,
+            within_exposure: Some(wrong),
+            ..Motion::still(0.0, pose(0))
+        };
+        for k in 1..4 {
+            let time = k as f64 * DT;
+            // Mid poses with an error of a tenth of a millimetre to and fro, which the limit is taken from.
+            let mid = pose(k).perturbed(&Vector6::repeat(1e-4 * if k % 2 == 0 { 1.0 } else { -1.0 }));
+            let expected = motion.expected_motion(&mid, time, 1.0, &CAMERA, 0.5).expected;
+            motion = Motion {
+                between_frames: motion.reference_from_mid.tangent_to(&mid) / DT,
+                within_exposure: Some(expected),
+                timestamp: time,
+                reference_from_mid: mid,
+                ..motion
+            };
+        }
+        let error = (motion.within_exposure.expect("a motion") - rate).norm() / rate.norm();
+        let before = (wrong - rate).norm() / rate.norm();
+        assert!(before > 2.9 && error < 0.1, "{error} of the motion is left of {before}");
+    }
+
+    #[test]
+    fn a_gyroscope_replaces_the_turn_and_nothing_else() {
+        let prior = motion(0.2).expected_motion(&pose(0.2 + DT), 0.2 + DT, 0.02, &CAMERA, 0.5);
+        let gyro = GyroReading {
+            angular_velocity: nalgebra::Vector3::new(0.3, -0.2, 0.1),
+            angular_acceleration: nalgebra::Vector3::new(10.0, 0.0, -5.0),
+        };
+        let told = Motion::with_gyro(prior, &gyro, 0.02);
+        assert_eq!(told.expected.fixed_rows::<3>(0), prior.expected.fixed_rows::<3>(0));
+        assert_eq!(told.expected.fixed_rows::<3>(3), gyro.angular_velocity * 0.02);
+        // Half of the acceleration times the square of the span.
+        assert_eq!(told.bow.fixed_rows::<3>(3), gyro.angular_acceleration * 2e-4);
+        assert_eq!(told.follows.map(|follows| (follows.motion[1], follows.bow[1])), Some((0.0, 0.0)));
+    }
+
+    #[test]
     fn extrapolation_continues_the_rate_but_not_across_a_gap() {
         let rate = Vector6::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.0);
         let ahead = motion(0.0).extrapolate(&rate, 0.1);

@@ -136,3 +136,24 @@ pub(super) fn wants_keyframe(
     let leaving = evidence.overlap < 0.45 || evidence.flow > 0.3 * width;
     usable && (much_sharper || (far && as_sharp) || leaving)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn covered_and_saturated_images_are_blind_and_dim_ones_are_not() {
+        assert!(is_blind(&[0.0; 64]));
+        assert!(is_blind(&[1.0; 64]));
+        let dim: [f32; 64] = core::array::from_fn(|k| 0.001 + 0.006 * (k % 2) as f32);
+        assert!(!is_blind(&dim));
+        assert!(!is_blind(&[0.5; 64]), "a grey wall has depth");
+    }
+
+    #[test]
+    fn residuals_below_the_floor_are_never_bad() {
+        let values =
+            [ratio(0.45, 0.05, RESIDUAL_FLOOR), ratio(3.0, 1.0, RESIDUAL_FLOOR), ratio(9.0, 0.0, 1.0)];
+        assert_eq!(values, [0.9, 3.0, 1.0]);
+    }
+}

@@ -17,7 +17,7 @@ use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
 };
 use crate::dataset::Dataset;
-use crate::evaluation::motion_of;
+use crate::evaluation::{motion_of, quantile};
 use crate::exposure::{ExposurePath, RowTiming};
 use crate::run::{FrameRecord, FrameStatus, Run};
 use crate::trajectory_file::TimedExposure;
@@ -193,7 +193,7 @@ pub(super) fn bundle(
 }
 
 /// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.
-/// The first keyframe says how bright the map is.
+/// The map is as bright as the median keyframe.
 fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState]) {
     let ratios: Vec<f64> = (1..keyframes.len())
         .into_par_iter()
@@ -208,7 +208,8 @@ fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState])
     let mut log_gains = vec![0.0];
     ratios.iter().for_each(|ratio| log_gains.push(log_gains[log_gains.len() - 1] + ratio));
     if log_gains.iter().any(|log_gain| log_gain.abs() > NOTICEABLE) {
-        states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain);
+        let median = quantile(&log_gains, 0.5).unwrap_or(0.0);
+        states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain - median);
     }
 }
 

@@ -8,8 +8,8 @@ use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
 use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
-use super::open;
 use super::written_run::{self, OUT_HINT, absolute, announce, name, or_auto};
+use super::{calibrate, open};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
@@ -25,6 +25,7 @@ const PROGRESS_STEPS: usize = 1000;
 pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let run = open::run(&args.trajectory)?;
+    let dataset = open::with_estimates(dataset, &run)?;
     let summary = map_into(&dataset, &run, &args.out, &args.mapping, args.resume, console)?;
     console.result(&summary, table::summary)
 }
@@ -50,6 +51,7 @@ pub fn map_into(
     let mapped = map_dataset(dataset, run, &settings, out, resume, describe(dataset, run, args), observe);
     progress.finish_and_clear();
     let summary = mapped.or_else(advise)?;
+    calibrate::keep(dataset, out)?;
     announce(&summary, out, console);
     Ok(summary)
 }

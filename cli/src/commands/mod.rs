@@ -2,6 +2,7 @@
 
 pub mod ablate;
 pub mod alignment;
+pub mod calibrate;
 pub mod demo;
 pub mod eval_images;
 pub mod eval_mesh;

@@ -8,8 +8,8 @@ use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::tracking::TrackingError;
 use serde_json::json;
 
-use super::open;
 use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, name, or_auto};
+use super::{calibrate, open};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
@@ -24,6 +24,7 @@ const REFINEMENT_STEPS: u64 = 1000;
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
 pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
+    let dataset = calibrate::completed(dataset, args.slamming.self_calibrate, console)?;
     let summary = slam_into(&dataset, &args.out, &args.slamming, console)?;
     console.result(&summary, table::summary)
 }
@@ -53,6 +54,7 @@ pub fn slam_into(
     let finished = run_slam(dataset, &SlamSettings::from(args), out, describe(dataset, args), observe);
     progress.finish_and_clear();
     let summary = finished.or_else(advise)?;
+    calibrate::keep(dataset, out)?;
     announce(&summary, out, console);
     Ok(summary)
 }

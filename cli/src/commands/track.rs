@@ -8,8 +8,8 @@ use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
-use super::open;
 use super::written_run::{self, CAMERA_HINT, OUT_HINT, note_written, or_auto};
+use super::{calibrate, open};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;
 use crate::failure::OrBadInput;
@@ -21,6 +21,7 @@ use crate::report::table;
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
 pub fn run(args: &Track, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
+    let dataset = calibrate::completed(dataset, args.tracking.self_calibrate, console)?;
     let summary = track_into(&dataset, &args.out, &args.tracking, console)?;
     console.result(&summary, table::summary)
 }
@@ -36,6 +37,7 @@ pub fn track_into(
     console: &Console,
 ) -> anyhow::Result<Summary> {
     let mut writer = RunWriter::create(out, settings(dataset, args)).or_else(advise_output)?;
+    calibrate::keep(dataset, out)?;
     for warning in dataset.warnings() {
         console.warning(warning.to_string());
         writer.warn(warning.to_string());

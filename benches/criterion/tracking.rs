@@ -12,7 +12,8 @@ use mba_tracker::image::GreyPyramid;
 use mba_tracker::keyframe::Keyframe;
 use mba_tracker::photometric::LuminanceTable;
 use mba_tracker::surface::InverseDepthMap;
-use mba_tracker::trajectory::ExposureTrajectory;
+use mba_tracker::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
+use mba_tracker::transfer::RowBand;
 use mba_tracker::workspace::Arena;
 use mba_tracker::{FrameStatus, SimdLevel, Tracker, TrackerConfig};
 use nalgebra::Vector6;
@@ -51,6 +52,7 @@ fn stages(c: &mut Criterion) {
         camera: config.camera.at_level(config.surface_level),
         stride: 2,
         gate: 0.02,
+        band: RowBand::whole(depth.height),
     };
     let pose = RigidTransform::identity();
     c.bench_function("depth term linearisation, stride 2", |b| {
@@ -75,10 +77,17 @@ fn deblurring(c: &mut Criterion) {
     // Ten pixels sideways.
     let motion = Vector6::new(0.0, 0.0, 0.0, 0.0, 10.0 / config.camera.fx, 0.0);
     let exposure = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &motion);
+    let path = BowedTrajectory::without_bow(exposure);
     c.bench_function("deblur a keyframe, 10 px", |b| {
         b.iter(|| {
-            let longest =
-                scratch.flow.fill(&exposure, &config.camera, &keyframe.planes, config.surface_level, 0.5);
+            let longest = scratch.flow.fill(
+                &path,
+                &FrameTiming::GLOBAL,
+                &config.camera,
+                &keyframe.planes,
+                config.surface_level,
+                0.5,
+            );
             let sharp = &mut keyframe.pyramid.levels[0];
             scratch.deblur(SimdLevel::new(), longest, config.deblur_iterations, sharp.pixels);
             keyframe.pyramid.reduce();

@@ -4,7 +4,7 @@ use mba_mapper::bundle::{
     BundleAdjustment, BundleSettings, FrameState, Keyframe, MapKind, ObservationPyramid, PathPrior, Sensor,
     StepReport,
 };
-use mba_mapper::exposure::ExposurePath;
+use mba_mapper::exposure::{ExposurePath, RowTiming};
 use mba_mapper::synth::{SynthConfig, SynthError, SynthFrame, SynthSequence};
 use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::InverseResponse;
@@ -92,6 +92,8 @@ pub(crate) fn sensor(sequence: &SynthSequence) -> Sensor {
         inverse_response: InverseResponse::srgb(),
         depth_scale: 5000.0,
         region: PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height },
+        rows: RowTiming::default(),
+        falloff: None,
     }
 }
 

@@ -52,10 +52,12 @@ impl Recording {
         let (width, height) = (frame.width, frame.height);
         Ok(Frame {
             timestamp,
+            depth_timestamp: timestamp,
             exposure: frame.exposure_seconds,
             colour: ColourView::new(&frame.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,
             depth: DepthView::new(&frame.depth, width, height, width)?,
             angular_velocity: None,
+            gyro: None,
         })
     }
 }

@@ -5,7 +5,6 @@ pub mod slam;
 pub mod surface;
 pub mod synth;
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -13,6 +12,9 @@ use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
+
+/// Most worker threads: several for every core of the largest machines.
+pub const MOST_THREADS: u16 = 1024;
 
 /// Motion-blur-aware RGB-D tracking and mapping on a CPU.
 #[derive(Debug, Parser)]
@@ -34,8 +36,8 @@ pub struct Global {
     #[arg(long, global = true)]
     pub json: bool,
     /// Worker threads; default: one per core. Results do not depend on it
-    #[arg(long, global = true, value_name = "N")]
-    pub threads: Option<NonZeroUsize>,
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS)))]
+    pub threads: Option<u16>,
     /// No progress and no notes on stderr
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
@@ -96,7 +98,9 @@ pub struct Demo {
 #[command(after_help = "\
 A data set is a folder in the layout of the TUM RGB-D benchmark: rgb.txt and depth.txt (or associations.txt), \
 the images, calibration.toml (not needed for freiburg1 to 3) and, optionally, groundtruth.txt, \
-groundtruth_exposure.txt and exposures.csv.
+groundtruth_exposure.txt, exposures.csv and the recording of an IMU: imu.csv, imu0/data.csv (EuRoC) or \
+accelerometer.txt (TUM). What is printed says of exposure, readout, response and fall-off whether they are \
+recorded or assumed.
 
 Example:
   mba info rgbd_dataset_freiburg1_rpy")]
@@ -145,6 +149,9 @@ pub struct Track {
     /// RUN folder to write; an earlier run in it is replaced
     #[arg(long, value_name = "RUN")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
     /// Choices about the tracker
     #[command(flatten)]
     pub tracking: Tracking,
@@ -237,9 +244,12 @@ pub struct Render {
     /// Poses to render from
     #[arg(long, value_name = "FILE")]
     pub poses: PathBuf,
-    /// Folder for the images
+    /// Folder for the images; earlier views in it are replaced
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
     /// Trajectory of the run's frames in the frame of the poses, e.g. the ground truth
     #[arg(long, value_name = "FILE")]
     pub align: Option<PathBuf>,
@@ -284,6 +294,9 @@ pub struct Report {
     /// Data set with the ground truth, if it has moved since the run
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
+    /// Write also over files that this program did not write
+    #[arg(long)]
+    pub force: bool,
 }
 
 /// What to measure.

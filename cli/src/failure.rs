@@ -5,7 +5,10 @@ use std::fmt;
 use std::io;
 
 use mba_mapper::FileError;
+use mba_mapper::output::OutputError;
 use mba_mapper::run::RunError;
+
+use crate::interrupt;
 
 /// Exit code of wrong use or bad input.
 pub const BAD_INPUT: u8 = 2;
@@ -46,6 +49,46 @@ impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrBadInput<T> for Result<T, E> {
     }
 }
 
+/// A command that stopped because a signal asked for it, with the command that goes on.
+#[derive(Debug)]
+pub struct Interrupted {
+    what: String,
+    hint: String,
+}
+
+impl fmt::Display for Interrupted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what)
+    }
+}
+
+impl Error for Interrupted {}
+
+/// An [`Interrupted`] after `what`.
+pub fn interrupted(what: impl Into<String>, hint: impl Into<String>) -> anyhow::Error {
+    Interrupted { what: what.into(), hint: hint.into() }.into()
+}
+
+/// A failure that is not a matter of wrong use, with advice.
+#[derive(Debug)]
+pub struct Failed {
+    message: String,
+    hint: String,
+}
+
+impl fmt::Display for Failed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl Error for Failed {}
+
+/// A [`Failed`] with its advice.
+pub fn failed(message: impl Into<String>, hint: impl Into<String>) -> anyhow::Error {
+    Failed { message: message.into(), hint: hint.into() }.into()
+}
+
 /// A [`BadInput`] without an underlying error.
 pub fn bad_input(message: impl Into<String>, hint: impl Into<String>) -> anyhow::Error {
     BadInput { source: message.into().into(), hint: hint.into() }.into()
@@ -54,7 +97,13 @@ pub fn bad_input(message: impl Into<String>, hint: impl Into<String>) -> anyhow:
 /// Exit code of an error.
 #[must_use]
 pub fn exit_code(error: &anyhow::Error) -> u8 {
-    if error.is::<BadInput>() { BAD_INPUT } else { FAILED }
+    if error.is::<BadInput>() {
+        BAD_INPUT
+    } else if error.is::<Interrupted>() {
+        interrupt::exit_code()
+    } else {
+        FAILED
+    }
 }
 
 /// `error: ...` with its causes on one line and, where there is advice, `hint: ...` on the next.
@@ -82,6 +131,12 @@ fn hint(error: &anyhow::Error) -> Option<&str> {
     if let Some(bad) = error.downcast_ref::<BadInput>() {
         return (!bad.hint.is_empty()).then_some(&bad.hint);
     }
+    if let Some(interrupted) = error.downcast_ref::<Interrupted>() {
+        return Some(&interrupted.hint);
+    }
+    if let Some(failed) = error.downcast_ref::<Failed>() {
+        return Some(&failed.hint);
+    }
     error
         .chain()
         .any(is_disk_full)
@@ -91,12 +146,18 @@ fn hint(error: &anyhow::Error) -> Option<&str> {
 /// Whether an error, leaving its causes aside, says that nothing more fits on the disk.
 #[must_use]
 pub fn is_disk_full(error: &(dyn Error + 'static)) -> bool {
-    let reason = match error.downcast_ref() {
-        Some(FileError::Unwritable { reason, .. }) => Some(reason),
-        _ => error.downcast_ref::<io::Error>(),
-    };
-    matches!(error.downcast_ref(), Some(RunError::DiskFull { .. }))
-        || reason.is_some_and(|reason| reason.kind() == io::ErrorKind::StorageFull)
+    let is_full = |reason: &io::Error| reason.kind() == io::ErrorKind::StorageFull;
+    let of_file =
+        |error: &FileError| matches!(error, FileError::Unwritable { reason, .. } if is_full(reason));
+    let of_output = |error: &OutputError| matches!(error, OutputError::File(error) if of_file(error));
+    match error.downcast_ref() {
+        Some(RunError::DiskFull { .. }) => return true,
+        Some(RunError::Output(error)) => return of_output(error),
+        _ => {}
+    }
+    error.downcast_ref().is_some_and(of_file)
+        || error.downcast_ref().is_some_and(of_output)
+        || error.downcast_ref().is_some_and(is_full)
 }
 
 #[cfg(test)]

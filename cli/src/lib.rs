@@ -1,9 +1,8 @@
 //! The commands of the `mba` program as a library, so that tests can call them without a process.
 //!
-//! Exit codes: 0 done, 1 failed, 2 wrong use or bad input. Results go to stdout, everything else to stderr.
+//! Exit codes: 0 done, 1 failed, 2 wrong use or bad input, 130 and 143 stopped by Ctrl-C or a request to end. Results go to stdout, everything else to stderr.
 
 use std::ffi::OsString;
-use std::num::NonZeroUsize;
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -12,9 +11,10 @@ pub mod args;
 pub mod commands;
 pub mod console;
 pub mod failure;
+pub mod interrupt;
 pub mod report;
 
-use args::{Cli, Command, EvalCommand};
+use args::{Cli, Command, EvalCommand, MOST_THREADS};
 use console::Console;
 
 /// Parses the command line (program name first), runs the command, reports an error and returns the exit code.
@@ -42,9 +42,18 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// Whatever stops the command; [`failure::exit_code`] tells bad input from failure.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     let console = Console::new(&cli.global);
-    let threads = cli.global.threads.map_or(0, NonZeroUsize::get);
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(cli.global.threads)).build()?;
     pool.install(|| dispatch(&cli.command, &console))
+}
+
+/// Number of worker threads; 0 for as many as the thread pool chooses itself, which listens to the environment.
+fn threads(asked: Option<u16>) -> usize {
+    let environment = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.parse::<usize>().ok());
+    match (asked, environment) {
+        (Some(asked), _) => asked.into(),
+        (None, Some(count)) if count > MOST_THREADS.into() => MOST_THREADS.into(),
+        (None, _) => 0,
+    }
 }
 
 fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {

@@ -17,6 +17,32 @@ pub enum FileError {
         /// What the operating system says.
         reason: io::Error,
     },
+    /// The path leads to something without a known end.
+    #[error("cannot read {path}: it is a {kind}, not a file")]
+    NotAFile {
+        /// The path.
+        path: PathBuf,
+        /// What it is, in a word.
+        kind: &'static str,
+    },
+    /// A text is not in UTF-8.
+    #[error("{path} is in {encoding}, expected UTF-8")]
+    Encoding {
+        /// The file.
+        path: PathBuf,
+        /// What it is in, as far as that is known.
+        encoding: String,
+    },
+    /// The file is larger than any that makes sense.
+    #[error("cannot read {path}: the file has {bytes} bytes, the most that is read is {limit}")]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Its size.
+        bytes: u64,
+        /// The largest size of a file of this kind.
+        limit: u64,
+    },
     /// The file cannot be written, for example because the disk is full; an older version of it is still there.
     #[error("cannot write {path}: {reason}")]
     Unwritable {

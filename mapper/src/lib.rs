@@ -31,6 +31,7 @@ pub mod imu;
 pub mod infill;
 pub mod losses;
 pub mod mapping;
+pub mod output;
 pub mod places;
 mod ply;
 mod png;

@@ -35,6 +35,11 @@ impl TextFile {
     }
 }
 
+/// Results are written with six decimals: times that are equal then could not be told apart.
+fn in_microseconds(seconds: f64) -> f64 {
+    (seconds * 1e6).round()
+}
+
 impl<'a> Line<'a> {
     /// Splits at white space and commas, as the TUM tools do.
     pub(crate) fn fields(&self) -> impl Iterator<Item = &'a str> + use<'a> {
@@ -86,7 +91,7 @@ impl<'a> Line<'a> {
             Some(previous) if timestamp < previous => {
                 Err(FileError::TimestampOrder { path, line, timestamp, previous })
             }
-            Some(previous) if timestamp == previous => {
+            Some(previous) if in_microseconds(timestamp) == in_microseconds(previous) => {
                 Err(FileError::TimestampDoubled { path, line, timestamp })
             }
             _ => Ok(()),

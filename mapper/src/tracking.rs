@@ -1,15 +1,18 @@
 //! Tracking a whole data set into a RUN folder.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use mba_tracker::error::{ConfigError, FrameError as TrackError};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 use mba_tracker::trajectory::ExposureTrajectory;
-use mba_tracker::{Frame, FrameResult, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{
+    Doubt, Frame, FrameResult, GyroReading, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig,
+};
 
 use crate::dataset::{Dataset, FrameError, RgbdFrame};
-use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter};
+use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
 
 /// What can be chosen about the tracker; everything else follows from the data set.
@@ -38,6 +41,9 @@ pub enum TrackingError {
     /// The data set's camera cannot be tracked with.
     #[error("the tracker cannot use this camera: {0}")]
     Camera(ConfigError),
+    /// Whoever watches asked for it; the folder is up to date.
+    #[error("stopped on request")]
+    Stopped,
     /// The results cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -74,7 +80,8 @@ fn depth_is_apart(dataset: &Dataset) -> bool {
     (0..dataset.len()).any(|index| apart(index) > SAME_TIME)
 }
 
-/// Tracks every frame of `dataset` in order and pushes it to `run`; `observe` is called after each with its record.
+/// Tracks every frame of `dataset` in order and pushes it to `run`; `observe` is called after each with its record
+/// and says whether to go on.
 ///
 /// A frame that cannot be read or used is skipped: it keeps the pose before it, counts as lost, and `run` gets a
 /// warning that says why. Nothing here depends on threads; the times are of the tracker alone, without reading images.
@@ -85,7 +92,7 @@ pub fn track_dataset(
     dataset: &Dataset,
     options: &TrackingOptions,
     run: &mut RunWriter,
-    mut observe: impl FnMut(&FrameRecord),
+    mut observe: impl FnMut(&FrameRecord) -> ControlFlow<()>,
 ) -> Result<(), TrackingError> {
     let config = tracker_config(dataset, options);
     config.validate().map_err(TrackingError::Camera)?;
@@ -94,7 +101,7 @@ pub fn track_dataset(
     // The tracker counts the frames it was given, the run those of the data set.
     let mut given = Vec::with_capacity(dataset.len());
     for index in 0..dataset.len() {
-        let record = match track_frame(&mut tracker, dataset, index) {
+        let record = match track_frame(&mut tracker, dataset, index, given.last().copied()) {
             Ok((result, ms)) => {
                 given.push(index);
                 if let Some(revision) = &result.revision {
@@ -117,7 +124,10 @@ pub fn track_dataset(
                 record
             }
         };
-        observe(&record);
+        if observe(&record).is_break() {
+            run.flush()?;
+            return Err(TrackingError::Stopped);
+        }
     }
     Ok(())
 }
@@ -135,9 +145,11 @@ fn track_frame(
     tracker: &mut Tracker<'_>,
     dataset: &Dataset,
     index: usize,
+    previous: Option<usize>,
 ) -> Result<(FrameResult, f64), SkipReason> {
     let image = dataset.frame(index)?;
-    let frame = tracker_view(&image)?;
+    let mut frame = tracker_view(&image)?;
+    add_gyroscope(&mut frame, dataset, previous);
     let begin = Instant::now();
     let result = tracker.track(&frame)?;
     Ok((result, begin.elapsed().as_secs_f64() * 1e3))
@@ -167,7 +179,26 @@ pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
         colour: ColourView::new(&image.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,
         depth: DepthView::new(&image.depth, width, height, width)?,
         angular_velocity: None,
+        gyro: None,
     })
+}
+
+/// Half of the time over which the turning around mid exposure is averaged, seconds: a few samples of a telephone's
+/// gyroscope, and less than a hand needs to change direction.
+const GYRO_HALF_WINDOW: f64 = 0.006;
+
+/// Gives a frame what the data set's gyroscope, if there is one, says of the turning around it and since frame `previous`.
+pub(crate) fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Option<usize>) {
+    let Some(imu) = dataset.imu() else { return };
+    let time = frame.timestamp;
+    frame.angular_velocity =
+        previous.and_then(|index| imu.mean_angular_velocity(dataset.timestamp(index), time));
+    let before = imu.mean_angular_velocity(time - GYRO_HALF_WINDOW, time);
+    let after = imu.mean_angular_velocity(time, time + GYRO_HALF_WINDOW);
+    frame.gyro = before.zip(after).map(|(before, after)| GyroReading {
+        angular_velocity: (before + after) * 0.5,
+        angular_acceleration: (after - before) / GYRO_HALF_WINDOW,
+    });
 }
 
 /// What is recorded of a frame that took `ms` milliseconds.
@@ -188,6 +219,20 @@ pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
         residual: f64::from(result.residual),
         inliers: f64::from(result.inliers),
         gain: f64::from(result.brightness.gain),
+        reason: result.doubt.map(reason),
+    }
+}
+
+fn reason(doubt: Doubt) -> Reason {
+    match doubt {
+        Doubt::Blind => Reason::Blind,
+        Doubt::NoStart => Reason::NoStart,
+        Doubt::NoMatch => Reason::NoMatch,
+        Doubt::Speed => Reason::Speed,
+        Doubt::Brightness => Reason::Brightness,
+        Doubt::Inliers => Reason::Inliers,
+        Doubt::Residual => Reason::Residual,
+        Doubt::FoundAgain => Reason::FoundAgain,
     }
 }
 
@@ -206,6 +251,7 @@ pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposu
         residual: f64::NAN,
         inliers: 0.0,
         gain: f64::NAN,
+        reason: Some(Reason::Skipped),
     };
     (exposure, record)
 }

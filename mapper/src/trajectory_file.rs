@@ -11,7 +11,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
-use crate::whole_file::write_whole;
+use crate::whole_file::write_text;
 
 /// How far the length of a quaternion in a file may be from 1; what is accepted is normalised.
 ///
@@ -57,10 +57,29 @@ impl TimedExposure {
 /// [`FileError`] if the file is unreadable, a line malformed, a number not finite, a quaternion further than
 /// [`QUATERNION_LENGTH_TOLERANCE`] from unit length, or timestamps are doubled or out of order.
 pub fn read_trajectory(path: &Path) -> Result<Vec<TimedPose>, FileError> {
-    read_lines(path, "timestamp tx ty tz qx qy qz qw", |line, numbers: [f64; 8]| {
-        let [timestamp, pose @ ..] = numbers;
-        Ok(TimedPose { timestamp, world_from_camera: pose_from_numbers(line, &pose)? })
-    })
+    let file = TextFile::read(path)?;
+    parsed(&file, POSE_LINE, pose_of_line).collect()
+}
+
+/// A trajectory that was recorded, lines that are no poses left out.
+#[derive(Debug)]
+pub(crate) struct Recorded<T> {
+    /// In order of time.
+    pub(crate) poses: Vec<T>,
+    /// How many lines are left out.
+    pub(crate) left_out: usize,
+    /// What is wrong with the first of them.
+    pub(crate) first_error: Option<FileError>,
+}
+
+/// As [`read_trajectory`], but only an unreadable file is an error.
+pub(crate) fn read_recorded_trajectory(path: &Path) -> Result<Recorded<TimedPose>, FileError> {
+    sound(path, POSE_LINE, pose_of_line)
+}
+
+/// As [`read_exposures`], but only an unreadable file is an error.
+pub(crate) fn read_recorded_exposures(path: &Path) -> Result<Recorded<TimedExposure>, FileError> {
+    sound(path, EXPOSURE_LINE, exposure_of_line)
 }
 
 /// Reads exposure lines: `timestamp`, then `tx ty tz qx qy qz qw` at opening, mid exposure and closing.
@@ -69,15 +88,19 @@ pub fn read_trajectory(path: &Path) -> Result<Vec<TimedPose>, FileError> {
 ///
 /// As [`read_trajectory`].
 pub fn read_exposures(path: &Path) -> Result<Vec<TimedExposure>, FileError> {
-    let expected = "timestamp and three poses tx ty tz qx qy qz qw (22 numbers)";
-    read_lines(path, expected, |line, numbers: [f64; 22]| {
-        Ok(TimedExposure {
-            timestamp: numbers[0],
-            start: pose_from_numbers(line, &numbers[1..8])?,
-            mid: pose_from_numbers(line, &numbers[8..15])?,
-            end: pose_from_numbers(line, &numbers[15..22])?,
-        })
-    })
+    let file = TextFile::read(path)?;
+    parsed(&file, EXPOSURE_LINE, exposure_of_line).collect()
+}
+
+/// Whether the first line of numbers of a file is one of exposures, with three poses, rather than one of a trajectory.
+///
+/// # Errors
+///
+/// [`FileError`] if the file is unreadable.
+pub fn has_exposures(path: &Path) -> Result<bool, FileError> {
+    const NUMBERS_PER_EXPOSURE: usize = 22;
+    let file = TextFile::read(path)?;
+    Ok(file.lines().next().is_some_and(|line| line.fields().count() == NUMBERS_PER_EXPOSURE))
 }
 
 /// Writes a TUM trajectory, timestamps with six decimals and poses with nine. The file appears whole or not at
@@ -87,7 +110,7 @@ pub fn read_exposures(path: &Path) -> Result<Vec<TimedExposure>, FileError> {
 ///
 /// [`FileError::Unwritable`].
 pub fn write_trajectory(path: &Path, poses: &[TimedPose]) -> Result<(), FileError> {
-    write_whole(path, &format_trajectory(poses))
+    write_text(path, &format_trajectory(poses))
 }
 
 /// The text of [`write_trajectory`].
@@ -107,7 +130,7 @@ pub(crate) fn format_trajectory(poses: &[TimedPose]) -> String {
 ///
 /// [`FileError::Unwritable`].
 pub fn write_exposures(path: &Path, exposures: &[TimedExposure]) -> Result<(), FileError> {
-    write_whole(path, &format_exposures(exposures))
+    write_text(path, &format_exposures(exposures))
 }
 
 /// The text of [`write_exposures`].
@@ -125,22 +148,60 @@ pub(crate) fn format_exposures(exposures: &[TimedExposure]) -> String {
     text
 }
 
-/// Parses every line into `N` numbers and a value; the first number is the timestamp.
-fn read_lines<const N: usize, T>(
+/// Form of a line of a trajectory.
+const POSE_LINE: &str = "timestamp tx ty tz qx qy qz qw";
+
+/// Form of a line of exposures.
+const EXPOSURE_LINE: &str = "timestamp and three poses tx ty tz qx qy qz qw (22 numbers)";
+
+fn pose_of_line(line: &Line<'_>, numbers: [f64; 8]) -> Result<TimedPose, FileError> {
+    let [timestamp, pose @ ..] = numbers;
+    Ok(TimedPose { timestamp, world_from_camera: pose_from_numbers(line, &pose)? })
+}
+
+fn exposure_of_line(line: &Line<'_>, numbers: [f64; 22]) -> Result<TimedExposure, FileError> {
+    Ok(TimedExposure {
+        timestamp: numbers[0],
+        start: pose_from_numbers(line, &numbers[1..8])?,
+        mid: pose_from_numbers(line, &numbers[8..15])?,
+        end: pose_from_numbers(line, &numbers[15..22])?,
+    })
+}
+
+/// Every line as `N` numbers, the first of which is the timestamp, and as a value. Times increase over the lines that are
+/// good.
+fn parsed<'a, const N: usize, T>(
+    file: &'a TextFile,
+    expected: &'static str,
+    parse: impl Fn(&Line<'_>, [f64; N]) -> Result<T, FileError> + 'a,
+) -> impl Iterator<Item = Result<T, FileError>> + 'a {
+    let mut previous = None;
+    file.lines().map(move |line| {
+        let numbers = line.numbers(expected)?;
+        line.check_order(numbers[0], previous)?;
+        let value = parse(&line, numbers)?;
+        previous = Some(numbers[0]);
+        Ok(value)
+    })
+}
+
+fn sound<const N: usize, T>(
     path: &Path,
     expected: &'static str,
     parse: impl Fn(&Line<'_>, [f64; N]) -> Result<T, FileError>,
-) -> Result<Vec<T>, FileError> {
+) -> Result<Recorded<T>, FileError> {
     let file = TextFile::read(path)?;
-    let mut previous = None;
-    file.lines()
-        .map(|line| {
-            let numbers = line.numbers(expected)?;
-            line.check_order(numbers[0], previous)?;
-            previous = Some(numbers[0]);
-            parse(&line, numbers)
-        })
-        .collect()
+    let mut recorded = Recorded { poses: Vec::new(), left_out: 0, first_error: None };
+    for line in parsed(&file, expected, parse) {
+        match line {
+            Ok(pose) => recorded.poses.push(pose),
+            Err(error) => {
+                recorded.left_out += 1;
+                recorded.first_error.get_or_insert(error);
+            }
+        }
+    }
+    Ok(recorded)
 }
 
 /// The pose of the seven finite numbers `tx ty tz qx qy qz qw`.

@@ -1,10 +1,12 @@
 //! A short blurred sequence of the generator on the disk, runs to start a map from, and maps of it.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use mba_mapper::dataset::{self, Dataset};
 use mba_mapper::evaluation::{blur_length, motion_of};
 use mba_mapper::mapping::{MapSettings, map_dataset};
+use mba_mapper::output::{OutputFolder, Permission};
 use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, StoredMap, Summary};
 use mba_mapper::slam::{SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
@@ -67,7 +69,7 @@ impl BlurredSequence {
     #[must_use]
     pub fn run_of(&self, name: &str, exposures: &[TimedExposure]) -> Run {
         let folder = self.path(name);
-        let mut writer = RunWriter::create(&folder, self.describe()).expect("a run");
+        let mut writer = RunWriter::create_in(&folder, self.describe()).expect("a run");
         for exposure in exposures {
             writer.push(*exposure, self.record(exposure)).expect("a frame");
         }
@@ -82,8 +84,9 @@ impl BlurredSequence {
     #[must_use]
     pub fn track(&self, name: &str) -> Run {
         let folder = self.path(name);
-        let mut writer = RunWriter::create(&folder, self.describe()).expect("a run");
-        track_dataset(&self.dataset, &TrackingOptions::default(), &mut writer, |_| ()).expect("tracked");
+        let mut writer = RunWriter::create_in(&folder, self.describe()).expect("a run");
+        track_dataset(&self.dataset, &TrackingOptions::default(), &mut writer, |_| ControlFlow::Continue(()))
+            .expect("tracked");
         writer.finish(|_| ()).expect("a finished run");
         Run::open(&folder).expect("a run")
     }
@@ -93,8 +96,8 @@ impl BlurredSequence {
     /// # Panics
     /// When mapping fails.
     pub fn map(&self, run: &Run, name: &str, settings: &MapSettings) -> Summary {
-        let out = self.path(name);
-        map_dataset(&self.dataset, run, settings, &out, false, self.describe(), |_| ()).expect("a map")
+        let (out, go_on) = (self.output(name), |_| ControlFlow::Continue(()));
+        map_dataset(&self.dataset, run, settings, out, false, self.describe(), go_on).expect("a map")
     }
 
     /// Tracks and maps the sequence into the folder `name`.
@@ -110,10 +113,20 @@ impl BlurredSequence {
     /// # Panics
     /// When that fails.
     pub fn slam_of(&self, dataset: &Dataset, name: &str, settings: &SlamSettings) -> Summary {
-        run_slam(dataset, settings, &self.path(name), self.describe(), |_| ()).expect("a finished run")
+        let (out, go_on) = (self.output(name), |_| ControlFlow::Continue(()));
+        run_slam(dataset, settings, out, false, self.describe(), go_on).expect("a finished run")
     }
 
-    fn describe(&self) -> RunSettings {
+    /// The folder `name` for a run.
+    /// The folder of a run of that name beside the data set.
+    #[must_use]
+    pub fn output(&self, name: &str) -> OutputFolder {
+        OutputFolder::for_run(&self.path(name), &Permission::default()).expect("a folder for a run")
+    }
+
+    /// What a run of the sequence says about itself.
+    #[must_use]
+    pub fn describe(&self) -> RunSettings {
         RunSettings {
             program: "test".to_owned(),
             dataset: self.dataset.folder().display().to_string(),
@@ -135,6 +148,7 @@ impl BlurredSequence {
             residual: 0.01,
             inliers: 1.0,
             gain: 1.0,
+            reason: None,
         }
     }
 }

@@ -111,10 +111,12 @@ impl RenderedFrame {
         Frame {
             timestamp: self.timestamp,
             exposure: self.exposure,
+            depth_timestamp: self.timestamp,
             colour: ColourView::new(&self.grey, width, height, width, PixelFormat::Grey8)
                 .expect("grey image"),
             depth: DepthView::new(&self.depth, width, height, width).expect("depth image"),
             angular_velocity: None,
+            gyro: None,
         }
     }
 

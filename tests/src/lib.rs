@@ -9,3 +9,4 @@ pub mod reference_values;
 pub mod small_dataset;
 pub mod still_run;
 pub mod transfer_scene;
+pub mod tree;

@@ -18,7 +18,7 @@ pub fn write(
 ) {
     let (program, dataset, options) = ("mba test".into(), "data".into(), Default::default());
     let settings = RunSettings { program, dataset, frame_rate: 10.0, camera, options };
-    let mut writer = RunWriter::create(run, settings).expect("a run");
+    let mut writer = RunWriter::create_in(run, settings).expect("a run");
     for (TimedPose { timestamp, world_from_camera }, status, keyframe) in frames {
         let [start, mid, end] = [*world_from_camera; 3];
         let record = FrameRecord {
@@ -32,6 +32,7 @@ pub fn write(
             residual: 1.0,
             inliers: 1.0,
             gain: 1.0,
+            reason: None,
         };
         writer.push(TimedExposure { timestamp: *timestamp, start, mid, end }, record).expect("a frame");
     }

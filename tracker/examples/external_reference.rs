@@ -45,6 +45,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             colour,
             depth,
             angular_velocity: None,
+            gyro: None,
         };
         let map_from_camera = tracker.track(&frame)?.world_from_camera;
 

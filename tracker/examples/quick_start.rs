@@ -26,6 +26,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             colour,
             depth,
             angular_velocity: None,
+            gyro: None,
         };
         let result = tracker.track(&frame)?;
 

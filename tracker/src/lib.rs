@@ -40,6 +40,7 @@
 //!     colour: ColourView::new(&grey, 160, 120, 160, PixelFormat::Grey8)?,
 //!     depth: DepthView::new(&depth, 160, 120, 160)?,
 //!     angular_velocity: None,
+//!     gyro: None,
 //! })?;
 //! println!("{:?}: opened at {:?}", result.status, result.world_from_camera.start);
 //! # Ok::<(), Box<dyn core::error::Error>>(())
@@ -83,7 +84,7 @@ pub mod workspace;
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;
 pub use tracker::{
-    Effort, Frame, FrameResult, FrameStatus, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, ReferenceView,
-    Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,
+    Doubt, Effort, Frame, FrameResult, FrameStatus, GyroReading, MAX_RECENT_KEYFRAMES, Readout,
+    ReferenceMode, ReferenceView, Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,
 };
 pub use work::Work;

@@ -31,6 +31,9 @@ pub struct Map {
     /// RUN folder that is written
     #[arg(long, value_name = "RUN2")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
     /// Go on from the checkpoint in RUN2, if there is one
     #[arg(long)]
     pub resume: bool,
@@ -127,7 +130,7 @@ fn default_keyframes() -> NonZeroUsize {
 }
 
 /// A number of seconds, finite and not negative.
-fn seconds(text: &str) -> Result<Duration, String> {
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
     Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
 }

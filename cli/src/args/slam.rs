@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use mba_mapper::slam::{Arrival, SlamReference, SlamSettings};
 
-use super::map::{Field, positive_seconds};
+use super::map::{Field, positive_seconds, seconds};
 use super::{BlurMode, Switch, virtual_views};
 
 /// Arguments of `mba slam`.
@@ -15,7 +15,8 @@ use super::{BlurMode, Switch, virtual_views};
 #[command(after_help = "\
 Tracker and mapper work at the same time: each frame is aligned with a sharp view rendered from the map, and the \
 map is refined with every frame. After the last frame all of it is refined once more. RUN gets what `mba map` \
-writes; its trajectory is kept up to date while frames come in, so that a stopped run can be evaluated.
+writes; its trajectory is kept up to date while frames come in, so that a stopped run can be evaluated. Without \
+--realtime, a run that was stopped, by a kill too, goes on with --resume and ends with the same files as one that was not.
 
 Examples:
   mba slam rgbd_dataset_freiburg1_rpy --out run
@@ -27,6 +28,12 @@ pub struct Slam {
     /// RUN folder to write; an earlier run in it is replaced
     #[arg(long, value_name = "RUN")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
+    /// Go on from the checkpoint in RUN, if there is one
+    #[arg(long, conflicts_with = "realtime")]
+    pub resume: bool,
     /// How it is done.
     #[command(flatten)]
     pub slamming: Slamming,
@@ -68,6 +75,9 @@ pub struct Slamming {
     /// At most this many Gaussians; default: a third of the pixels that showed something new
     #[arg(long, value_name = "N")]
     pub max_gaussians: Option<NonZeroUsize>,
+    /// Seconds between two checkpoints, without --realtime; 0 for one after every frame and step
+    #[arg(long, value_name = "S", default_value = "20", value_parser = seconds)]
+    pub checkpoint_interval: Duration,
     /// Seed of the choice of keyframes to visit
     #[arg(long, value_name = "N", default_value_t = SlamSettings::default().seed)]
     pub seed: u64,
@@ -134,6 +144,7 @@ impl From<&Slamming> for SlamSettings {
             max_keyframes: args.max_keyframes.get(),
             max_gaussians: args.max_gaussians.map(NonZeroUsize::get),
             time_budget: args.time_budget,
+            checkpoint_interval: args.checkpoint_interval,
             arrival: if args.realtime { Arrival::RealTime } else { Arrival::LockStep },
             seed: args.seed,
         }
@@ -148,6 +159,7 @@ impl Default for Slamming {
             time_budget: None,
             max_keyframes: default_keyframes(),
             max_gaussians: None,
+            checkpoint_interval: SlamSettings::default().checkpoint_interval,
             seed: SlamSettings::default().seed,
             self_calibrate: Switch::default(),
             ablation: Ablation::default(),

@@ -23,9 +23,12 @@ pub struct Mesh {
     /// RUN folder with a map
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// Mesh to write
+    /// PLY file to write; an earlier mesh is replaced. A pipe or device is written to, and - is the standard output
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
+    /// Write also over what this program did not write; never over a data set
+    #[arg(long)]
+    pub force: bool,
     /// Edge of a voxel in centimetres
     #[arg(long, value_name = "CM", default_value_t = 1.0, value_parser = positive)]
     pub voxel_cm: f64,

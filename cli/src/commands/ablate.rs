@@ -39,7 +39,7 @@ pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
             None => {
                 console.note(format!("{name}:"));
                 let slamming = Slamming { ablation, ..Slamming::default() };
-                slam::slam_into(&dataset, &out, &slamming, console)?
+                slam::slam_into(&dataset, &out, (false, true), &slamming, console)?
             }
         };
         rows.push(Row::new(name, &summary));

@@ -23,10 +23,10 @@ pub fn run(args: &Demo, console: &Console) -> anyhow::Result<()> {
     let tracked = args.out.join(format!("run-{name}"));
     let mapped = args.out.join(format!("mapped-{name}"));
     let dataset = sequence(config, &data, console)?;
-    track::track_into(&dataset, &tracked, &Tracking::default(), console)?;
+    track::track_into(&dataset, &tracked, false, &Tracking::default(), console)?;
     let run = Run::open(&tracked)?;
-    let summary = map::map_into(&dataset, &run, &mapped, &Mapping::default(), false, console)?;
-    let path = report::write(&Run::open(&mapped)?, Some(&dataset))?;
+    let summary = map::map_into(&dataset, &run, &mapped, false, &Mapping::default(), false, console)?;
+    let path = report::write(&Run::open(&mapped)?, Some(&dataset), false)?;
     console.result(&summary, table::summary)?;
     console.note(format!("open {} in a browser", path.display()));
     Ok(())

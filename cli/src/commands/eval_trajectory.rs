@@ -1,6 +1,5 @@
 //! `mba eval trajectory`.
 
-use std::fs;
 use std::path::Path;
 
 use mba_mapper::dataset::survey;
@@ -8,7 +7,7 @@ use mba_mapper::evaluation::{
     BlurFigures, TrajectoryError, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
 };
 use mba_mapper::run::mid_pose;
-use mba_mapper::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
+use mba_mapper::trajectory_file::{TimedExposure, TimedPose, has_exposures, read_exposures, read_trajectory};
 use serde::Serialize;
 
 use super::open;
@@ -37,9 +36,12 @@ pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
     let reference = Poses::read(&args.reference)?;
     let estimate = Poses::read(&args.estimate)?;
     let options = TrajectoryOptions { alignment: args.align.into(), max_dt: args.max_dt };
-    let evaluation = evaluate_trajectory(&reference.trajectory, &estimate.trajectory, &options)
-        .map_err(|error| (hint(&error), error))
-        .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
+    let evaluation =
+        evaluate_trajectory(&reference.trajectory, &estimate.trajectory, &options).map_err(|error| {
+            let [reference, estimate] =
+                [&args.reference, &args.estimate].map(|path| path.display().to_string());
+            bad_input(format!("{estimate} against {reference}: {error}"), hint(&error))
+        })?;
     let blur = blur_figures(args, &reference, &estimate, console)?;
     let report = Report { trajectory: TrajectoryFigures::from(&evaluation), blur };
     console.result(&report, |report| {
@@ -99,19 +101,10 @@ struct Poses {
 impl Poses {
     fn read(path: &Path) -> anyhow::Result<Self> {
         const HINT: &str = "a TUM trajectory has lines `timestamp tx ty tz qx qy qz qw`";
-        if !has_three_poses(path) {
+        if !has_exposures(path).or_bad_input(HINT)? {
             return Ok(Self { trajectory: read_trajectory(path).or_bad_input(HINT)?, exposures: None });
         }
         let exposures = read_exposures(path).or_bad_input(HINT)?;
         Ok(Self { trajectory: exposures.iter().map(mid_pose).collect(), exposures: Some(exposures) })
     }
-}
-
-/// Whether the first line of numbers is that of an exposures file. A file that cannot be read is left to the reader,
-/// which has the better message.
-fn has_three_poses(path: &Path) -> bool {
-    const NUMBERS_PER_EXPOSURE: usize = 22;
-    let text = fs::read_to_string(path).unwrap_or_default();
-    let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
-    first.is_some_and(|line| line.split_whitespace().count() == NUMBERS_PER_EXPOSURE)
 }

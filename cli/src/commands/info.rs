@@ -1,16 +1,23 @@
 //! `mba info`.
 
-use mba_mapper::dataset::{Calibration, Dataset, ExposureSource, Readout, Response, Survey, survey};
+use std::path::Path;
+
+use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::evaluation::associate;
 use serde::Serialize;
 
+use super::camera_facts::CameraFacts;
 use super::open;
 use crate::args::Info;
 use crate::console::Console;
+use crate::failure::bad_input;
 use crate::report::table::{pairs, percent};
 
 /// Frames whose images are read.
 const SAMPLED_FRAMES: usize = 16;
+
+/// Median depths in metres that a depth camera can have seen.
+const PLAUSIBLE_DEPTH: std::ops::RangeInclusive<f64> = 0.1..=30.0;
 
 /// What is printed.
 #[derive(Serialize)]
@@ -29,11 +36,8 @@ struct Facts {
     cy: f64,
     distortion: [f64; 5],
     depth_scale: f64,
-    response: &'static str,
-    readout: &'static str,
-    exposure_source: &'static str,
-    shortest_exposure_s: f64,
-    longest_exposure_s: f64,
+    #[serde(flatten)]
+    camera: CameraFacts,
     sampled_frames: usize,
     unreadable_frames: usize,
     frames_without_depth: usize,
@@ -48,18 +52,26 @@ struct Facts {
 /// Opens a data set, looks at some of its frames and prints what is there.
 ///
 /// # Errors
-/// Bad input when the data set cannot be used.
+/// Bad input when the data set cannot be used, or when no frame of it can be read.
 pub fn run(args: &Info, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
-    console.result(&Facts::of(&dataset, survey(&dataset, SAMPLED_FRAMES)), table)
+    let survey = survey(&dataset, SAMPLED_FRAMES);
+    let (unreadable, sampled) = (survey.unreadable.len(), survey.sampled);
+    let first = survey.unreadable.first().cloned().unwrap_or_default();
+    console.result(&Facts::of(&dataset, survey), table)?;
+    if unreadable == sampled {
+        let message = format!("none of {sampled} sampled frames can be read, the first because {first}");
+        return Err(bad_input(message, "correct the lists, or restore the images"));
+    }
+    Ok(())
 }
 
 impl Facts {
     fn of(dataset: &Dataset, survey: Survey) -> Self {
         let stamps: Vec<f64> = (0..dataset.len()).map(|k| dataset.timestamp(k)).collect();
-        let exposures = || (0..dataset.len()).map(|k| dataset.exposure_seconds(k));
         let duration_s = stamps.last().zip(stamps.first()).map_or(0.0, |(last, first)| last - first);
         let calibration = dataset.calibration();
+        let facts = CameraFacts::of(dataset);
         let (camera, lens) = (calibration.camera, calibration.distortion);
         Self {
             name: dataset.name().to_owned(),
@@ -76,11 +88,6 @@ impl Facts {
             cy: camera.cy,
             distortion: [lens.k1, lens.k2, lens.p1, lens.p2, lens.k3],
             depth_scale: calibration.depth_scale,
-            response: response_name(calibration),
-            readout: readout_name(calibration.readout),
-            exposure_source: exposure_name(calibration.exposure),
-            shortest_exposure_s: exposures().fold(f64::INFINITY, f64::min),
-            longest_exposure_s: exposures().fold(0.0, f64::max),
             sampled_frames: survey.sampled,
             unreadable_frames: survey.unreadable.len(),
             frames_without_depth: survey.without_depth,
@@ -89,7 +96,8 @@ impl Facts {
             ground_truth_poses: dataset.ground_truth().len(),
             ground_truth_share_of_frames: truth_share(dataset, &stamps),
             ground_truth_exposures: dataset.ground_truth_exposures().len(),
-            warnings: warnings(dataset, survey),
+            warnings: warnings(dataset, &facts, survey),
+            camera: facts,
         }
     }
 }
@@ -101,9 +109,13 @@ fn truth_share(dataset: &Dataset, stamps: &[f64]) -> f64 {
     associate(&truth, stamps, 0.5 * interval).len() as f64 / stamps.len().max(1) as f64
 }
 
-fn warnings(dataset: &Dataset, survey: Survey) -> Vec<String> {
+fn warnings(dataset: &Dataset, camera: &CameraFacts, survey: Survey) -> Vec<String> {
     let mut warnings: Vec<String> = dataset.warnings().iter().map(ToString::to_string).collect();
-    warnings.extend(survey.unreadable);
+    warnings.extend(camera.contradictions(dataset));
+    warnings.extend(grouped(survey.unreadable, dataset.folder()));
+    if let Some(median) = survey.median_depth.filter(|median| !PLAUSIBLE_DEPTH.contains(median)) {
+        warnings.push(format!("the median depth is {median} m: is depth_scale in raw units per metre?"));
+    }
     if survey.without_depth > 0 {
         let (empty, sampled) = (survey.without_depth, survey.sampled);
         warnings.push(format!("{empty} of {sampled} sampled depth images hold no depth at all"));
@@ -111,27 +123,27 @@ fn warnings(dataset: &Dataset, survey: Survey) -> Vec<String> {
     warnings
 }
 
-fn response_name(calibration: &Calibration) -> &'static str {
-    match calibration.response {
-        Response::Srgb => "srgb",
-        Response::Linear => "linear",
-        Response::Table(_) => "table",
+/// Sentences that differ in the name of a file of `folder` only, once with their number.
+fn grouped(sentences: Vec<String>, folder: &Path) -> Vec<String> {
+    let folder = folder.display().to_string();
+    // What is left of a sentence without the words that are paths in the data set.
+    let gist = |sentence: &str| -> String {
+        sentence.split(' ').filter(|word| !word.starts_with(&folder)).collect::<Vec<_>>().join(" ")
+    };
+    let mut groups: Vec<(String, usize, String)> = Vec::new();
+    for sentence in sentences {
+        let gist = gist(&sentence);
+        match groups.iter_mut().find(|(known, ..)| *known == gist) {
+            Some((_, count, _)) => *count += 1,
+            None => groups.push((gist, 1, sentence)),
+        }
     }
-}
-
-fn readout_name(readout: Readout) -> &'static str {
-    match readout {
-        Readout::Global => "global",
-        Readout::Rolling { .. } => "rolling",
-    }
-}
-
-fn exposure_name(source: ExposureSource) -> &'static str {
-    match source {
-        ExposureSource::Constant { .. } => "calibration",
-        ExposureSource::PerFrame => "per frame",
-        ExposureSource::Assumed { .. } => "assumed",
-    }
+    let more = |count| match count {
+        0 => String::new(),
+        1 => " (and 1 more like this)".to_owned(),
+        more => format!(" (and {more} more like this)"),
+    };
+    groups.into_iter().map(|(_, count, first)| first + &more(count - 1)).collect()
 }
 
 fn table(facts: &Facts) -> String {
@@ -149,26 +161,17 @@ fn table(facts: &Facts) -> String {
         ("focal length", format!("{:.2} {:.2} px", facts.fx, facts.fy)),
         ("principal point", format!("{:.2} {:.2} px", facts.cx, facts.cy)),
         ("distortion", distortion(&facts.distortion)),
-        ("response, readout", format!("{}, {}", facts.response, facts.readout)),
-        ("exposure", exposure(facts)),
+    ];
+    rows.extend(facts.camera.rows());
+    rows.extend([
         ("depth scale", format!("{} per metre", facts.depth_scale)),
         ("median depth", depth),
         ("missing depth", format!("{missing} of {} sampled frames", facts.sampled_frames)),
         ("ground truth", truth),
         ("true exposures", facts.ground_truth_exposures.to_string()),
-    ];
+    ]);
     rows.extend(facts.warnings.iter().map(|warning| ("warning", warning.clone())));
     pairs(&rows)
-}
-
-fn exposure(facts: &Facts) -> String {
-    let (shortest, longest) = (1e3 * facts.shortest_exposure_s, 1e3 * facts.longest_exposure_s);
-    let range = if shortest == longest {
-        format!("{shortest:.2} ms")
-    } else {
-        format!("{shortest:.2} to {longest:.2} ms")
-    };
-    format!("{range} ({})", facts.exposure_source)
 }
 
 fn distortion(coefficients: &[f64; 5]) -> String {
@@ -177,4 +180,16 @@ fn distortion(coefficients: &[f64; 5]) -> String {
     }
     let [k1, k2, p1, p2, k3] = coefficients;
     format!("k1 {k1} k2 {k2} p1 {p1} p2 {p2} k3 {k3}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn like_sentences_are_counted() {
+        let sentences = ["/data/rgb/1.png is cut", "/data/rgb/2.png is cut", "/data/rgb/3.png is green"];
+        let grouped = grouped(sentences.map(str::to_owned).into(), Path::new("/data"));
+        assert_eq!(grouped, ["/data/rgb/1.png is cut (and 1 more like this)", "/data/rgb/3.png is green"]);
+    }
 }

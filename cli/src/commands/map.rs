@@ -8,11 +8,12 @@ use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
 use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
-use super::written_run::{self, OUT_HINT, absolute, announce, name, or_auto};
+use super::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 use super::{calibrate, open};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
-use crate::failure::{OrBadInput, is_disk_full};
+use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
+use crate::interrupt;
 use crate::report::table;
 
 /// Steps of the progress bar: positions are shares, not counts.
@@ -26,11 +27,11 @@ pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let run = open::run(&args.trajectory)?;
     let dataset = open::with_estimates(dataset, &run)?;
-    let summary = map_into(&dataset, &run, &args.out, &args.mapping, args.resume, console)?;
+    let summary = map_into(&dataset, &run, &args.out, args.force, &args.mapping, args.resume, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Maps `dataset` from the poses of `run` into the RUN folder `out`.
+/// Maps `dataset` from the poses of `run` into the RUN folder `out`; with `force` also into a folder of others.
 ///
 /// # Errors
 /// As [`run`].
@@ -38,19 +39,27 @@ pub fn map_into(
     dataset: &Dataset,
     run: &Run,
     out: &Path,
+    force: bool,
     args: &Mapping,
     resume: bool,
     console: &Console,
 ) -> anyhow::Result<Summary> {
+    interrupt::watch();
     let settings = MapSettings::from(args);
+    let folder = claim(out, force, &[dataset.folder(), &run.folder])?;
     let progress = console.progress(PROGRESS_STEPS, "mapping");
     let observe = |at: MapProgress| {
         progress.set_position((at.position * PROGRESS_STEPS as f64) as u64);
         progress.set_message(format!("mapping: {}, loss {:.4}, {:.1} dB", at.size, at.loss, at.psnr));
+        interrupt::flow()
     };
-    let mapped = map_dataset(dataset, run, &settings, out, resume, describe(dataset, run, args), observe);
+    let mapped = map_dataset(dataset, run, &settings, folder, resume, describe(dataset, run, args), observe);
     progress.finish_and_clear();
-    let summary = mapped.or_else(advise)?;
+    if let Err(MapError::Stopped) = mapped {
+        let message = format!("stopped; {} holds the tracked poses and a checkpoint", out.display());
+        return Err(interrupted(message, format!("`{}` goes on", interrupt::command_to_go_on(true))));
+    }
+    let summary = mapped.or_else(|error| advise(error, run))?;
     calibrate::keep(dataset, out)?;
     announce(&summary, out, console);
     Ok(summary)
@@ -72,7 +81,7 @@ fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
 }
 
 /// Advice for what the user can repair.
-fn advise(error: MapError) -> anyhow::Result<Summary> {
+fn advise(error: MapError, run: &Run) -> anyhow::Result<Summary> {
     let disk_is_full = match &error {
         MapError::Run(error) => is_disk_full(error),
         MapError::Checkpoint(CheckpointError::File(error)) => is_disk_full(error),
@@ -80,6 +89,10 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
     };
     if disk_is_full {
         return Err(error.into());
+    }
+    if let MapError::Continuity(error) = &error {
+        let message = format!("the poses of {} make no path: {error}", run.folder.display());
+        return Err(bad_input(message, "track the data set again"));
     }
     let hint = match &error {
         MapError::Frames { .. } | MapError::Timestamp { .. } => {
@@ -90,7 +103,6 @@ fn advise(error: MapError) -> anyhow::Result<Summary> {
         MapError::Checkpoint(_) => {
             "start without --resume, or with the inputs and options of the stopped run"
         }
-        MapError::Continuity(_) => "track the data set again",
         _ => OUT_HINT,
     };
     Err(error).or_bad_input(hint)

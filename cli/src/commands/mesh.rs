@@ -1,21 +1,25 @@
 //! `mba mesh`.
 
+use std::path::Path;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
+use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::rendering::Scene;
-use mba_mapper::run::{FrameStatus, MAP_FILE, Run};
+use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::surfaces::{
-    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map, write_mesh,
+    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, format_mesh, is_own_mesh, passes,
+    surface_of_map,
 };
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
+use super::written_run::refuse;
 use crate::args::surface::Mesh;
 use crate::console::Console;
-use crate::failure::{OrBadInput, bad_input, is_disk_full};
+use crate::failure::{OrBadInput, bad_input, failed, is_disk_full};
 use crate::report::table::pairs;
 
 /// What is printed.
@@ -39,6 +43,7 @@ struct Written {
 pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
     let start = Instant::now();
     let run = open::run(&args.run)?;
+    let out = output(args, &run)?;
     let map = open::map(&run)?;
     let map = Scene::from(&map);
     let camera = camera(&run)?;
@@ -54,15 +59,13 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
         .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
     source.progress.finish_and_clear();
     if mesh.triangles.is_empty() {
-        console.warning(format!(
-            "no keyframe sees a surface in {}: the mesh is empty",
-            run.folder.join(MAP_FILE).display()
-        ));
+        let message = format!("no keyframe sees a surface in the map of {}", run.folder.display());
+        return Err(failed(message, "look at the map with `mba report`; nothing was written"));
     }
     if let Some(alignment) = &alignment {
         mesh.transform(&alignment.reference_from_estimate);
     }
-    match write_mesh(&args.out, &mesh) {
+    match out.write(&format_mesh(&mesh)) {
         Err(error) if !is_disk_full(&error) => {
             Err(error).or_bad_input("name a file for --out that can be written")?;
         }
@@ -78,7 +81,25 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
         seconds: start.elapsed().as_secs_f64(),
         alignment: alignment.as_ref().map(AlignmentFigures::from),
     };
+    if out.is_stdout() {
+        console.note(table(&written).trim_end());
+        return Ok(());
+    }
     console.result(&written, table)
+}
+
+/// Claims the file for the mesh, before the work.
+fn output(args: &Mesh, run: &Run) -> anyhow::Result<OutputFile> {
+    let is_ply = args.out.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("ply"));
+    let mut inputs: Vec<&Path> = vec![Path::new(&run.summary.settings.dataset)];
+    inputs.extend(args.align.as_deref());
+    let out = OutputFile::claim(&args.out, &Permission { force: args.force, inputs: &inputs }, is_own_mesh)
+        .or_else(refuse)?;
+    if !is_ply && !out.is_stream() {
+        let message = format!("cannot write {}: meshes are written as PLY", args.out.display());
+        return Err(bad_input(message, "name a file that ends in .ply for --out"));
+    }
+    Ok(out)
 }
 
 fn camera(run: &Run) -> anyhow::Result<PinholeCamera> {

@@ -3,6 +3,7 @@
 pub mod ablate;
 pub mod alignment;
 pub mod calibrate;
+mod camera_facts;
 pub mod demo;
 pub mod eval_images;
 pub mod eval_mesh;
@@ -11,6 +12,7 @@ pub mod info;
 pub mod map;
 pub mod mesh;
 pub mod open;
+pub mod outcome;
 pub mod render;
 pub mod report;
 pub mod slam;

@@ -62,7 +62,7 @@ fn dataset_hint(error: &DatasetError) -> &'static str {
         DatasetError::UnknownLayout { .. } => "give the folder that holds the lists of images",
         DatasetError::MissingCalibration { .. } => "see the data set section of the README for an example",
         DatasetError::CalibrationSyntax { .. } | DatasetError::CalibrationValue { .. } => {
-            "correct the calibration; lengths are in pixels of the stored images"
+            "correct the calibration; lengths are in pixels of the stored images, times in seconds"
         }
         DatasetError::EmptyList { .. } => "the list needs lines `timestamp file`",
         DatasetError::NoAssociation { .. } => "write associations.txt to pair the images yourself",

@@ -1,10 +1,10 @@
 //! `mba render`.
 
-use std::fs;
 use std::path::Path;
 use std::time::Instant;
 
 use mba_mapper::evaluation::PoseAlignment;
+use mba_mapper::output::{Permission, ViewFolder};
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
 use mba_mapper::run::{MAP_FILE, Run, RunCamera, Spread, StoredMap};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
@@ -12,6 +12,7 @@ use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
+use super::written_run::refuse;
 use crate::args::{Render, Switch, ViewNames};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
@@ -50,7 +51,12 @@ pub fn run(args: &Render, console: &Console) -> anyhow::Result<()> {
         ));
     }
     let poses = in_map_frame(&poses, alignment.as_ref());
-    let written = render_all(&map, &camera, &poses, args, console)?;
+    let names = poses.iter().enumerate().map(|(index, pose)| name(args.names, index, pose));
+    let inputs = [Path::new(&run.summary.settings.dataset), &run.folder];
+    let permission = Permission { force: args.force, inputs: &inputs };
+    let folder = ViewFolder::claim(&args.out, &permission, names).or_else(refuse)?;
+    let written = render_all(&map, &camera, &poses, (args, &folder), console)?;
+    folder.finish().or_else(refuse)?;
     console.result(&Written { alignment: alignment.as_ref().map(AlignmentFigures::from), ..written }, table)
 }
 
@@ -94,13 +100,9 @@ fn render_all(
     map: &StoredMap,
     camera: &RunCamera,
     poses: &[TimedPose],
-    args: &Render,
+    (args, folder): (&Render, &ViewFolder),
     console: &Console,
 ) -> anyhow::Result<Written> {
-    let depth_folder = args.out.join("depth");
-    fs::create_dir_all(&depth_folder)
-        .map_err(|reason| format!("cannot create {}: {reason}", depth_folder.display()))
-        .or_bad_input("name a folder for --out that can be created")?;
     let mut renderer =
         ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
     let progress = console.progress(poses.len(), "rendering");
@@ -112,7 +114,7 @@ fn render_all(
         let view = renderer.render(&pose.world_from_camera, behind);
         times.push(1e3 * start.elapsed().as_secs_f64());
         solid += view.solid / poses.len() as f64;
-        write(&view, &args.out, &depth_folder, &name(args.names, index, pose))?;
+        write(&view, folder, &name(args.names, index, pose))?;
         progress.inc(1);
     }
     progress.finish_and_clear();
@@ -128,8 +130,9 @@ fn render_all(
     })
 }
 
-fn write(view: &RenderedView, colour: &Path, depth: &Path, name: &str) -> anyhow::Result<()> {
-    match view.write(&colour.join(name), &depth.join(name)) {
+fn write(view: &RenderedView, folder: &ViewFolder, name: &str) -> anyhow::Result<()> {
+    let [colour, depth] = folder.paths(name);
+    match view.write(&colour, &depth) {
         Err(error) if !is_disk_full(&error) => {
             Err(error).or_bad_input("name a folder for --out that can be written")
         }

@@ -24,7 +24,7 @@ pub fn run(args: &Report, console: &Console) -> anyhow::Result<()> {
     let folder = args.dataset.clone().unwrap_or_else(|| run.summary.settings.dataset.clone().into());
     let dataset =
         if args.dataset.is_some() { Some(open::dataset(&folder)?) } else { open_if_there(&folder, console) };
-    let path = report::write(&run, dataset.as_ref())?;
+    let path = report::write(&run, dataset.as_ref(), args.force)?;
     console.result(&Written { report: path.display().to_string() }, |written| {
         format!("wrote {}", written.report)
     })

@@ -2,17 +2,20 @@
 
 use std::path::Path;
 
-use mba_mapper::dataset::Dataset;
+use mba_mapper::checkpoint::CheckpointError;
+use mba_mapper::dataset::{Dataset, Warning};
+use mba_mapper::mapping::MapError;
 use mba_mapper::run::{RunError, RunSettings, Summary};
 use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::tracking::TrackingError;
 use serde_json::json;
 
-use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, name, or_auto};
-use super::{calibrate, open};
+use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
+use super::{calibrate, open, outcome};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
-use crate::failure::{OrBadInput, is_disk_full};
+use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
+use crate::interrupt;
 use crate::report::table;
 
 /// Steps of the refinement's progress bar: positions are shares, not counts.
@@ -24,38 +27,59 @@ const REFINEMENT_STEPS: u64 = 1000;
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
 pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
+    if args.slamming.realtime
+        && let Some(warning) = dataset.warnings().iter().find(|w| matches!(w, Warning::TimestampUnit { .. }))
+    {
+        let hint = "correct the timestamps, or leave --realtime out";
+        return Err(bad_input(format!("frames cannot come by their times: {warning}"), hint));
+    }
     let dataset = calibrate::completed(dataset, args.slamming.self_calibrate, console)?;
-    let summary = slam_into(&dataset, &args.out, &args.slamming, console)?;
+    let summary = slam_into(&dataset, &args.out, (args.force, args.resume), &args.slamming, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Tracks and maps `dataset` into the RUN folder `out`.
+/// Tracks and maps `dataset` into the RUN folder `out`; with `force` also into a folder of others. With
+/// `resume`, goes on from the checkpoint there.
 ///
 /// # Errors
 /// As [`run`].
 pub fn slam_into(
     dataset: &Dataset,
     out: &Path,
+    (force, resume): (bool, bool),
     args: &Slamming,
     console: &Console,
 ) -> anyhow::Result<Summary> {
+    interrupt::watch();
+    let folder = claim(out, force, &[dataset.folder()])?;
     let progress = console.progress(dataset.len(), "frames");
-    let observe = |at: SlamProgress| match at {
-        SlamProgress::Frames { frames, keyframes, map, loops } => {
-            progress.set_position(frames as u64);
-            progress.set_message(format!("frames: {keyframes} keyframes, {map}, {loops} loops"));
+    let observe = |at: SlamProgress| {
+        match at {
+            SlamProgress::Frames { frames, keyframes, map, loops } => {
+                progress.set_position(frames as u64);
+                progress.set_message(format!("frames: {keyframes} keyframes, {map}, {loops} loops"));
+            }
+            SlamProgress::Refinement { position, psnr } => {
+                progress.set_length(REFINEMENT_STEPS);
+                progress.set_position((position * REFINEMENT_STEPS as f64) as u64);
+                progress.set_message(format!("refining: {psnr:.1} dB"));
+            }
         }
-        SlamProgress::Refinement { position, psnr } => {
-            progress.set_length(REFINEMENT_STEPS);
-            progress.set_position((position * REFINEMENT_STEPS as f64) as u64);
-            progress.set_message(format!("refining: {psnr:.1} dB"));
-        }
+        interrupt::flow()
     };
-    let finished = run_slam(dataset, &SlamSettings::from(args), out, describe(dataset, args), observe);
+    let finished =
+        run_slam(dataset, &SlamSettings::from(args), folder, resume, describe(dataset, args), observe);
     progress.finish_and_clear();
-    let summary = finished.or_else(advise)?;
+    if let Err(SlamError::Stopped) = finished {
+        let message = format!("stopped; {} holds the frames so far, marked as incomplete", out.display());
+        let goes_on = if args.realtime { "starts again" } else { "goes on" };
+        let command = interrupt::command_to_go_on(!args.realtime);
+        return Err(interrupted(message, format!("`{command}` {goes_on}")));
+    }
+    let summary = finished.or_else(|error| advise(error, dataset))?;
     calibrate::keep(dataset, out)?;
     announce(&summary, out, console);
+    outcome::check(&summary, dataset, console)?;
     Ok(summary)
 }
 
@@ -80,18 +104,26 @@ fn describe(dataset: &Dataset, args: &Slamming) -> RunSettings {
 }
 
 /// Advice for what the user can repair.
-fn advise(error: SlamError) -> anyhow::Result<Summary> {
+fn advise(error: SlamError, dataset: &Dataset) -> anyhow::Result<Summary> {
     let disk_is_full = match &error {
         SlamError::Run(error) => is_disk_full(error),
-        SlamError::Map(mba_mapper::mapping::MapError::Run(error)) => is_disk_full(error),
+        SlamError::Map(MapError::Run(error)) => is_disk_full(error),
+        SlamError::Checkpoint(CheckpointError::File(error))
+        | SlamError::Map(MapError::Checkpoint(CheckpointError::File(error))) => is_disk_full(error),
         _ => false,
     };
     if disk_is_full {
         return Err(error.into());
     }
+    if let SlamError::Map(MapError::NoKeyframe(_) | MapError::NoDepth) = &error {
+        return Err(outcome::failure(dataset, ""));
+    }
     let hint = match &error {
         SlamError::Tracking(TrackingError::Camera(_)) => CAMERA_HINT,
         SlamError::Run(RunError::Unwritable { .. }) => OUT_HINT,
+        SlamError::Checkpoint(_) | SlamError::Map(MapError::Checkpoint(_)) => {
+            "start without --resume, or with the data set and options of the stopped run"
+        }
         SlamError::Map(_) => "a map needs frames with depth that can be tracked; see `mba info DATASET`",
         _ => "see `mba info DATASET`",
     };

@@ -5,7 +5,7 @@ use std::path::Path;
 use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset};
 use serde::Serialize;
 
-use super::written_run::OUT_HINT;
+use super::written_run::{OUT_HINT, refuse};
 use crate::args::synth::Synth;
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
@@ -55,6 +55,7 @@ pub fn synthesise(config: SynthConfig, out: &Path, console: &Console) -> anyhow:
 fn advise<T>(error: SynthError) -> anyhow::Result<T> {
     let hint = match error {
         SynthError::File(error) if is_disk_full(&error) => return Err(error.into()),
+        SynthError::Output(error) => return refuse(error),
         SynthError::File(_) => OUT_HINT,
         SynthError::FolderNotEmpty { .. } => "nothing that exists is overwritten",
         _ => "see `mba synth --help` for the ranges",

@@ -8,11 +8,12 @@ use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
-use super::written_run::{self, CAMERA_HINT, OUT_HINT, note_written, or_auto};
-use super::{calibrate, open};
+use super::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
+use super::{calibrate, open, outcome};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;
-use crate::failure::OrBadInput;
+use crate::failure::{OrBadInput, interrupted};
+use crate::interrupt;
 use crate::report::table;
 
 /// Tracks a data set into a RUN folder and prints the summary.
@@ -22,35 +23,47 @@ use crate::report::table;
 pub fn run(args: &Track, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let dataset = calibrate::completed(dataset, args.tracking.self_calibrate, console)?;
-    let summary = track_into(&dataset, &args.out, &args.tracking, console)?;
+    let summary = track_into(&dataset, &args.out, args.force, &args.tracking, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Tracks `dataset` into the RUN folder `out`.
+/// Tracks `dataset` into the RUN folder `out`; with `force` also into a folder of others.
 ///
 /// # Errors
 /// As [`run`].
 pub fn track_into(
     dataset: &Dataset,
     out: &Path,
+    force: bool,
     args: &Tracking,
     console: &Console,
 ) -> anyhow::Result<Summary> {
-    let mut writer = RunWriter::create(out, settings(dataset, args)).or_else(advise_output)?;
-    calibrate::keep(dataset, out)?;
+    interrupt::watch();
+    let folder = claim(out, force, &[dataset.folder()])?;
+    let mut writer = RunWriter::create(folder, settings(dataset, args))?;
     for warning in dataset.warnings() {
         console.warning(warning.to_string());
         writer.warn(warning.to_string());
     }
     let progress = console.progress(dataset.len(), "tracking");
-    let tracked = track_dataset(dataset, &TrackingOptions::from(args), &mut writer, |_| progress.inc(1));
+    let tracked = track_dataset(dataset, &TrackingOptions::from(args), &mut writer, |_| {
+        progress.inc(1);
+        interrupt::flow()
+    });
     progress.finish_and_clear();
     match tracked {
         Err(TrackingError::Camera(error)) => {
             Err(error).or_bad_input(CAMERA_HINT)?;
         }
+        Err(TrackingError::Stopped) => return Err(stopped(dataset, out, writer.frames().len())),
         other => other?,
     }
+    if outcome::nothing_tracked(writer.frames()) && writer.has_earlier() {
+        writer.give_up();
+        return Err(outcome::failure(dataset, "; the earlier run in the folder stays"));
+    }
+    writer.replace_earlier()?;
+    calibrate::keep(dataset, out)?;
     if args.keyframes == Switch::On {
         deblur_keyframes(dataset, args, &mut writer, console)?;
     }
@@ -65,6 +78,7 @@ pub fn track_into(
         console.warning(format!("{} frames were skipped, the first: {reason}", summary.frames.skipped));
     }
     note_written(out, console);
+    outcome::check(&summary, dataset, console)?;
     Ok(summary)
 }
 
@@ -93,10 +107,11 @@ fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
     written_run::settings(dataset, &values)
 }
 
-/// An output that cannot be written from the start is wrong use; a full disk is not.
-fn advise_output(error: RunError) -> anyhow::Result<RunWriter> {
-    match error {
-        RunError::DiskFull { .. } => Err(error.into()),
-        _ => Err(error).or_bad_input(OUT_HINT),
-    }
+fn stopped(dataset: &Dataset, out: &Path, frames: usize) -> anyhow::Error {
+    let message = format!(
+        "stopped after {frames} of {} frames; {} holds them, marked as incomplete",
+        dataset.len(),
+        out.display()
+    );
+    interrupted(message, format!("`{}` starts again", interrupt::command_to_go_on(false)))
 }

@@ -4,17 +4,51 @@ use std::path::Path;
 
 use clap::ValueEnum;
 use mba_mapper::dataset::Dataset;
+use mba_mapper::output::{OutputError, OutputFolder, Permission};
 use mba_mapper::run::{RunCamera, RunSettings, Summary};
 use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::console::Console;
+use crate::failure::{OrBadInput, is_disk_full};
 
 /// Advice when the folder cannot be written.
 pub const OUT_HINT: &str = "name a folder for --out that can be created or written";
 
 /// Advice when the tracker refuses the camera.
 pub const CAMERA_HINT: &str = "check the calibration: the tracker needs at least 32 x 32 pixels";
+
+/// Claims the folder `out` for a RUN of a command that reads `inputs`.
+///
+/// # Errors
+/// Bad input with advice; failure when the disk is full.
+pub fn claim(out: &Path, force: bool, inputs: &[&Path]) -> anyhow::Result<OutputFolder> {
+    OutputFolder::for_run(out, &Permission { force, inputs }).or_else(refuse)
+}
+
+/// The refusal of an output, with advice.
+///
+/// # Errors
+/// Always: bad input, or failure when the disk is full.
+pub fn refuse<T>(error: OutputError) -> anyhow::Result<T> {
+    if is_disk_full(&error) {
+        return Err(error.into());
+    }
+    let hint = output_hint(&error);
+    Err(error).or_bad_input(hint)
+}
+
+/// Advice for an output that is refused.
+#[must_use]
+pub fn output_hint(error: &OutputError) -> &'static str {
+    match error {
+        OutputError::DataSet { .. } | OutputError::Input { .. } => "name another place for --out",
+        OutputError::Foreign { .. } => "name a new place for --out, or add --force if it may be written over",
+        OutputError::DeadLink { .. } => "remove the link, or name another place for --out",
+        OutputError::InUse { .. } => "wait until that process has ended, or name another place for --out",
+        _ => "name a place for --out that can be created or written",
+    }
+}
 
 /// The settings of a run on `dataset`; `options` is an object.
 #[must_use]

@@ -9,6 +9,15 @@ use super::table::{map_rows, percent, slam_rows};
 
 const STYLE: &str = include_str!("style.css");
 
+/// What follows the title of a page.
+const TITLE_END: &str = " · mba</title>";
+
+/// Whether a file that begins with `start` is a page as [`page`] makes it.
+#[must_use]
+pub(super) fn is_own_page(start: &[u8]) -> bool {
+    start.starts_with(b"<!doctype html>") && String::from_utf8_lossy(start).contains(TITLE_END)
+}
+
 /// The whole page; `pictures` are its sections with pictures.
 #[must_use]
 pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
@@ -31,7 +40,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<title>{title} · mba</title>
+<title>{title}{TITLE_END}
 <style>
 {STYLE}</style>
 </head>

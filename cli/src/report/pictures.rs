@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 use image::imageops::{self, FilterType};
-use image::{ImageReader, RgbImage};
-use mba_mapper::dataset::Dataset;
+use mba_mapper::dataset::{self, Dataset};
 use mba_mapper::evaluation::psnr;
 use mba_mapper::run::{Run, deblurred_path};
 
@@ -130,7 +130,7 @@ fn captured(dataset: &Dataset, index: usize) -> Option<RgbImage> {
 }
 
 fn read_image(path: &Path) -> Option<RgbImage> {
-    Some(ImageReader::open(path).ok()?.with_guessed_format().ok()?.decode().ok()?.into_rgb8())
+    Some(dataset::read_image(path).ok()?.into_rgb8())
 }
 
 fn pack(images: &Images, width: u32) -> anyhow::Result<KeyframePictures> {

@@ -13,6 +13,7 @@ use super::map_model::{MapKind, SceneMap, SeedView, Workbench};
 use super::observation::{Observation, ObservationPyramid, Sensor};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
+use super::rectified::seen_at_once;
 use super::schedule::{Schedule, StepPlan};
 use super::seeding::{self, DepthSource};
 
@@ -89,7 +90,7 @@ pub struct BundleAdjustment {
 pub struct StepReport {
     /// The keyframe, counted from 0.
     pub keyframe: usize,
-    /// Virtual views that were rendered.
+    /// Virtual views of a pixel that were rendered.
     pub views: usize,
     /// Loss before the step.
     pub terms: LossTerms,
@@ -131,6 +132,12 @@ impl BundleAdjustment {
         &self.keyframes
     }
 
+    /// The sensor.
+    #[must_use]
+    pub fn sensor(&self) -> &Sensor {
+        &self.bench.sensor
+    }
+
     /// The schedule.
     #[must_use]
     pub fn schedule(&self) -> &Schedule {
@@ -167,6 +174,12 @@ impl BundleAdjustment {
         self.settings.max_gaussians = max_gaussians;
     }
 
+    /// Most Gaussians.
+    #[must_use]
+    pub fn max_gaussians(&self) -> usize {
+        self.settings.max_gaussians
+    }
+
     /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,
     /// once more, surfaces that no keyframe has a depth of.
     pub fn seed(&mut self) {
@@ -182,9 +195,11 @@ impl BundleAdjustment {
 
     /// Adds what keyframe `k` sees and the map does not cover.
     pub fn seed_from(&mut self, k: usize, source: DepthSource) {
-        let world_from_camera = self.state.frames[k].path.mid();
+        let FrameState { path, log_gain, .. } = &self.state.frames[k];
+        let (world_from_camera, gain) = (path.mid(), log_gain.exp() as f32);
         let Keyframe { index, observation, .. } = &self.keyframes[k];
-        let view = SeedView { index: *index, seen: observation.level(0), world_from_camera, source };
+        let seen = seen_at_once(observation.level(0), path);
+        let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
         self.state.map.model_mut().seed(&mut self.bench, &view, self.settings.max_gaussians);
     }
 
@@ -197,12 +212,10 @@ impl BundleAdjustment {
         open as f64 / alpha.len().max(1) as f64
     }
 
-    /// Number of virtual views that a step with `plan` on keyframe `k` renders.
+    /// Number of virtual views of a pixel that a step with `plan` on keyframe `k` renders.
     #[must_use]
     pub fn views(&self, k: usize, plan: &StepPlan) -> usize {
-        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
-        let camera = &keyframe.observation.level(plan.level).camera;
-        self.settings.views(frame.blur_px(camera, keyframe.depth), plan)
+        self.settings.view_count(&self.keyframes[k], &self.state.frames[k], plan).per_pixel
     }
 
     /// One step on the next keyframe, after which the schedule stands at `position_after`. `timed` says whether
@@ -225,7 +238,8 @@ impl BundleAdjustment {
     pub fn visit(&mut self, k: usize, plan: &StepPlan) -> StepReport {
         let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
         let seen = keyframe.observation.level(plan.level);
-        let views = self.views(k, plan);
+        let count = self.settings.view_count(keyframe, frame, plan);
+        let views = count.of_row;
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
         let draw = self.state.steps as u64;
         let loss = self.state.map.model().evaluate(&mut self.bench, exposure, plan, draw);
@@ -237,7 +251,7 @@ impl BundleAdjustment {
         let is_first = k == 0;
         if plan.path_pixels > 0.0 {
             // One view says nothing about the motion.
-            let still = !self.settings.blur || views == 1;
+            let still = !self.settings.blur || count.still;
             let hold = [is_first || plan.only_motions, still, still || plan.only_motions];
             let step = PathStep { pixels: plan.path_pixels, hold };
             frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, &keyframe.metric, step);
@@ -247,7 +261,7 @@ impl BundleAdjustment {
         }
         frame.visits += 1;
         *steps += 1;
-        StepReport { keyframe: k, views, terms: loss.terms }
+        StepReport { keyframe: k, views: count.per_pixel, terms: loss.terms }
     }
 
     /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution, of
@@ -261,7 +275,7 @@ impl BundleAdjustment {
         let (mut best, mut least) = (frame.clone(), f64::INFINITY);
         for k in 0..count {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
-            let views = self.settings.views(frame.blur_px(&seen.camera, unmapped.depth), &plan);
+            let views = self.settings.view_count(unmapped, frame, &plan).of_row;
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
             let loss = self.state.map.model().evaluate(&mut self.bench, exposure, &plan, draw);
             if loss.terms.total() < least {
@@ -293,11 +307,36 @@ impl BundleAdjustment {
     /// Length of the blur of keyframe `k`, full-resolution pixels.
     #[must_use]
     pub fn blur_px(&self, k: usize) -> f64 {
-        self.state.frames[k].blur_px(&self.bench.sensor.camera, self.keyframes[k].depth)
+        let keyframe = &self.keyframes[k];
+        let exposure = keyframe.observation.level(0).times.exposure;
+        self.state.frames[k].blur_px(&self.bench.sensor.camera, keyframe.depth, exposure)
     }
 }
 
+/// Virtual views of a picture.
+struct ViewCount {
+    /// Of the exposure of one row.
+    of_row: usize,
+    /// That a pixel is rendered in: neighbours in time have a part in a row, and depth may have its own.
+    per_pixel: usize,
+    /// Whether the picture says nothing about a motion.
+    still: bool,
+}
+
 impl BundleSettings {
+    /// Virtual views of a frame for a step with `plan`.
+    fn view_count(&self, keyframe: &Keyframe, frame: &FrameState, plan: &StepPlan) -> ViewCount {
+        let Observation { camera, times, .. } = keyframe.observation.level(plan.level);
+        let blur_px = frame.blur_px(camera, keyframe.depth, times.exposure);
+        let views = self.views(blur_px, plan);
+        if times.is_global() {
+            return ViewCount { of_row: views, per_pixel: views, still: views == 1 };
+        }
+        // What is sharp in every row may still lean.
+        let sweep_px = frame.blur_px(camera, keyframe.depth, times.exposure + times.readout.abs());
+        ViewCount { of_row: views, per_pixel: views + 2, still: views == 1 && sweep_px <= SHARP_PX }
+    }
+
     /// Number of virtual views for a blur length in pixels of the plan's resolution; odd.
     fn views(&self, blur_px: f64, plan: &StepPlan) -> usize {
         let most = if self.blur { plan.max_views.min(self.max_views) } else { 1 };

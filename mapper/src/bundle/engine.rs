@@ -35,7 +35,7 @@ pub struct Exposure<'a> {
     pub path: &'a ExposurePath,
     /// Gain on the map's light.
     pub gain: f64,
-    /// Number of virtual views.
+    /// Number of virtual views of the exposure of a row.
     pub views: usize,
 }
 
@@ -76,7 +76,7 @@ impl Engine {
         let Exposure { seen, path, gain, views } = exposure;
         let (camera, gain) = (&seen.camera, gain as f32);
         let (scratch, image) = (&mut self.scratch, &mut self.image);
-        self.renderer.forward(gaussians, camera, path, views, [0.0; 3], scratch, image);
+        self.renderer.forward_rows(gaussians, camera, path, &seen.times, views, [0.0; 3], scratch, image);
         let mut terms = self.planes.compare(&self.curve, gain, image, seen, plan.weights.colour);
         if plan.weights.similarity > 0.0 {
             let size = [camera.width, camera.height];

@@ -135,6 +135,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::exposure::RowTimes;
 
     #[test]
     fn the_box_holds_what_is_seen_wherever_a_keyframe_is_moved_to() {
@@ -142,7 +143,8 @@ mod tests {
         let region = PixelRectangle { left: 0, top: 0, right: 16, bottom: 12 };
         let plane = || vec![0; 16 * 12];
         let colour = [plane(), plane(), plane()];
-        let seen = Observation { camera, colour, depth: vec![2.0; 16 * 12], region };
+        let depth = vec![2.0; 16 * 12];
+        let seen = Observation { camera, colour, depth, region, times: RowTimes::GLOBAL, falloff: None };
         let mut map = FieldMap::new(1);
         assert!(map.is_empty());
         for x in [0.0, 1.5] {

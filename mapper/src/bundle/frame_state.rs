@@ -12,7 +12,7 @@ use crate::exposure::ExposurePath;
 /// Path and brightness of one frame, and how their optimisation goes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameState {
-    /// Path of the camera during the exposure.
+    /// Path of the camera while anything of the frame was measured: during the exposure, if that is all.
     #[serde(with = "stored_path")]
     pub path: ExposurePath,
     /// Logarithm of the gain on the map's light that gives the frame's.
@@ -38,11 +38,13 @@ impl FrameState {
         }
     }
 
-    /// Length of the blur at a depth (metres), pixels of `camera`: of both halves of the path together.
+    /// Length of the blur at a depth (metres), pixels of `camera`: of both halves of the exposure together, which takes
+    /// the share `exposure` of the path.
     #[must_use]
-    pub fn blur_px(&self, camera: &PinholeCamera, depth: f64) -> f64 {
-        let ExposurePath { ends: ExposureTrajectory { start, end }, .. } = self.path;
-        let mid = self.path.mid();
+    pub fn blur_px(&self, camera: &PinholeCamera, depth: f64, exposure: f64) -> f64 {
+        let path = self.path.stretched(exposure);
+        let ExposurePath { ends: ExposureTrajectory { start, end }, .. } = path;
+        let mid = path.mid();
         let halves = [ExposureTrajectory { start, end: mid }, ExposureTrajectory { start: mid, end }];
         halves.iter().map(|half| blur_length(half, camera, depth)).sum()
     }

@@ -39,10 +39,10 @@ impl MapModel for GaussianMap {
 
     fn seed(&mut self, bench: &mut Workbench, view: &SeedView<'_>, most: usize) {
         bench.renderer.render(self.scene(), bench.sensor.camera, &view.world_from_camera);
-        let SeedView { index, seen, world_from_camera, source } = view;
+        let SeedView { index, .. } = view;
         let (alpha, response) = (&bench.renderer.image.alpha, &bench.sensor.inverse_response);
         let room = most.saturating_sub(self.gaussians.len());
-        seeding::seed(&mut self.gaussians, seen, response, world_from_camera, alpha, *source, room);
+        seeding::seed(&mut self.gaussians, view, response, alpha, room);
         self.ledger.enrol(self.gaussians.len(), *index);
     }
 

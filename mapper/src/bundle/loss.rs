@@ -83,13 +83,14 @@ impl Row<'_> {
         &mut self,
         curve: &DisplayCurve,
         gain: f32,
-        light: &[f32],
-        bytes: &[u8],
+        falloff: Option<&[f32]>,
+        (light, bytes): (&[f32], &[u8]),
         columns: Range<usize>,
         weight: f32,
     ) -> [f32; 2] {
         let mut sums = [0.0_f32; 2];
         for (x, (&light, &byte)) in light.iter().zip(bytes).enumerate() {
+            let gain = falloff.map_or(gain, |falloff| gain * falloff[x]);
             let [value, by_light] = curve.at(gain * light);
             let target = f32::from(byte) * (1.0 / 255.0);
             let counts = columns.contains(&x) && !(byte >= CLIPPED && value > target);
@@ -105,7 +106,7 @@ impl Row<'_> {
 }
 
 impl DisplayPlanes {
-    /// Takes a rendered image to display values, with `gain` on its light, and starts the gradient with the colour
+    /// Takes a rendered image to display values, with `gain` and the lens's fall-off on its light, and starts the gradient with the colour
     /// term. Returns that term and the mean squared difference. Image and observation have the same size.
     pub(super) fn compare(
         &mut self,
@@ -129,8 +130,10 @@ impl DisplayPlanes {
             let given = (light.par_chunks(image.width), bytes.par_chunks(image.width));
             let rows = rows.zip(given).enumerate();
             let of_rows: Vec<[f32; 2]> = rows
-                .map(|(y, (mut row, (light, bytes)))| {
-                    row.compare(curve, gain, light, bytes, columns(y), weight * share)
+                .map(|(y, (mut row, given))| {
+                    let falloff = seen.falloff.as_ref();
+                    let falloff = falloff.map(|plane| &plane[y * image.width..(y + 1) * image.width]);
+                    row.compare(curve, gain, falloff, given, columns(y), weight * share)
                 })
                 .collect();
             for row in of_rows {
@@ -247,6 +250,7 @@ mod tests {
     use mba_tracker::photometric::InverseResponse;
 
     use super::*;
+    use crate::exposure::RowTimes;
 
     const SIZE: [usize; 2] = [6, 5];
     const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.0, depth: 3.0, alpha: 0.2 };
@@ -275,6 +279,8 @@ mod tests {
                 .map(|pixel| if pixel % 7 == 0 { 0.0 } else { 2.0 + fraction(pixel + 77) })
                 .collect(),
             region: PixelRectangle { left: 1, top: 0, right: 6, bottom: 4 },
+            times: RowTimes::GLOBAL,
+            falloff: None,
         }
     }
 

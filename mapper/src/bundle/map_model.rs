@@ -83,6 +83,8 @@ pub(super) struct SeedView<'a> {
     pub(super) seen: &'a Observation,
     /// The pose at mid exposure.
     pub(super) world_from_camera: RigidTransform,
+    /// Gain on the map's light that gives what was captured.
+    pub(super) gain: f32,
     /// Where depth comes from.
     pub(super) source: DepthSource,
 }

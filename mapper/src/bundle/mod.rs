@@ -6,6 +6,7 @@
 
 mod adam;
 mod adjustment;
+mod brightness;
 mod density;
 mod display;
 mod engine;
@@ -19,11 +20,13 @@ mod moving;
 mod observation;
 mod path_metric;
 mod path_step;
+mod rectified;
 mod schedule;
 mod seeding;
 mod smooth_depth;
 
 pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport};
+pub(crate) use brightness::{NOTICEABLE, Placed, log_brightness};
 pub use display::DisplayCurve;
 pub use engine::{Engine, Exposure, ExposureLoss};
 pub use field_map::FieldMap;

@@ -1,5 +1,7 @@
 //! What is observed in a keyframe, at full and at reduced resolutions.
 
+use std::sync::Arc;
+
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::InverseResponse;
@@ -7,6 +9,7 @@ use rayon::prelude::*;
 
 use crate::dataset::RgbdFrame;
 use crate::deblurring::ForwardResponse;
+use crate::exposure::{RowTimes, RowTiming};
 
 /// A captured frame at one resolution.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,10 +18,14 @@ pub struct Observation {
     pub camera: PinholeCamera,
     /// Red, green and blue as stored, one plane each, row by row.
     pub colour: [Vec<u8>; 3],
-    /// Depth at mid exposure in metres, row by row; 0 where missing.
+    /// Depth in metres, row by row; 0 where missing.
     pub depth: Vec<f32>,
     /// Pixels that stem from the sensor; what is outside is not compared.
     pub region: PixelRectangle,
+    /// When rows of colour and of depth were exposed, on the path of the frame.
+    pub times: RowTimes,
+    /// Share of light that the lens lets through to each pixel, row by row; none where it is the same for all.
+    pub falloff: Option<Arc<[f32]>>,
 }
 
 impl Observation {
@@ -48,6 +55,9 @@ impl Observation {
 }
 
 /// A captured frame at full resolution and at halves of it.
+///
+/// The path of a frame covers all the time in which anything of it was measured; for a camera that exposes all rows
+/// together and measures depth with them, that is the exposure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObservationPyramid {
     levels: Vec<Observation>,
@@ -64,6 +74,20 @@ pub struct Sensor {
     pub depth_scale: f64,
     /// Pixels of every frame that stem from the sensor.
     pub region: PixelRectangle,
+    /// How rows are read.
+    pub rows: RowTiming,
+    /// Share of light that the lens lets through to each pixel of a frame, row by row; none where it is the same for all.
+    pub falloff: Option<Arc<[f32]>>,
+}
+
+impl Sensor {
+    /// Row times of a frame on its path, and how many times as long as the exposure the path is.
+    #[must_use]
+    pub fn times(&self, exposure_seconds: f64, depth_offset_seconds: f64) -> (RowTimes, f64) {
+        let span = self.rows.span_seconds(exposure_seconds, depth_offset_seconds);
+        let times = self.rows.over(span, exposure_seconds, depth_offset_seconds);
+        (times, if times.exposure > 0.0 { 1.0 / times.exposure } else { 1.0 })
+    }
 }
 
 /// Depths of a 2x2 block count as one surface within this factor of the nearest.
@@ -81,11 +105,14 @@ impl ObservationPyramid {
         }
         let plane = |channel: usize| frame.rgb.iter().skip(channel).step_by(3).copied().collect();
         let metres = 1.0 / sensor.depth_scale;
+        let (times, _) = sensor.times(frame.exposure_seconds, frame.depth_timestamp - frame.timestamp);
         let full = Observation {
             camera: sensor.camera,
             colour: [plane(0), plane(1), plane(2)],
             depth: frame.depth.iter().map(|&raw| (f64::from(raw) * metres) as f32).collect(),
             region: sensor.region,
+            times,
+            falloff: sensor.falloff.clone(),
         };
         let forward = ForwardResponse::new(&sensor.inverse_response);
         let mut all = vec![full];
@@ -140,6 +167,11 @@ fn half(sensor: &Sensor, forward: &ForwardResponse, finer: &Observation, level: 
         colour,
         depth,
         region: sensor.region.at_level(level),
+        times: finer.times,
+        falloff: finer.falloff.as_ref().map(|falloff| {
+            let mean = |block: [usize; 4]| 0.25 * block.iter().map(|&pixel| falloff[pixel]).sum::<f32>();
+            blocks(finer).map(mean).collect::<Vec<f32>>().into()
+        }),
     }
 }
 

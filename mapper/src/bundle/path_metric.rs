@@ -136,6 +136,7 @@ mod tests {
     use nalgebra::UnitQuaternion;
 
     use super::*;
+    use crate::exposure::RowTimes;
 
     /// A textured floor that recedes from 1 to 3 m.
     fn observation() -> Observation {
@@ -149,6 +150,8 @@ mod tests {
                 .map(|pixel| 3.0 - 2.0 * (pixel / width) as f32 / height as f32)
                 .collect(),
             region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+            times: RowTimes::GLOBAL,
+            falloff: None,
         }
     }
 

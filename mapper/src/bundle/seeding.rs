@@ -4,6 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
+use super::map_model::SeedView;
 use super::observation::Observation;
 use super::smooth_depth::smooth_depth;
 use crate::gaussians::{Gaussian, Gaussians};
@@ -63,19 +64,18 @@ fn depth_to_seed(
     depth
 }
 
-/// Appends Gaussians on the surface that `seen` shows from `world_from_camera`, one per square that is uniform in
-/// colour and depth, unless the middle of the square is covered according to `alpha` (row by row, as large as `seen`).
+/// Appends Gaussians on the surface that a view shows, one per square that is uniform in
+/// colour and depth, unless the middle of the square is covered according to `alpha` (row by row, as large as the view).
 ///
 /// Adds at most `room` and returns how many.
 pub(super) fn seed(
     gaussians: &mut Gaussians,
-    seen: &Observation,
+    view: &SeedView<'_>,
     inverse_response: &InverseResponse,
-    world_from_camera: &RigidTransform,
     alpha: &[f32],
-    source: DepthSource,
     room: usize,
 ) -> usize {
+    let SeedView { seen, world_from_camera, gain, source, .. } = view;
     let before = gaussians.len();
     let open = open_blocks(seen, alpha);
     if room == 0 || !open.contains(&true) {
@@ -83,8 +83,8 @@ pub(super) fn seed(
     }
     let width = seen.camera.width;
     let is_open = |x: usize, y: usize| open[y / LARGEST * width.div_ceil(LARGEST) + x / LARGEST];
-    let depth = depth_to_seed(seen, |pixel| is_open(pixel % width, pixel / width), source);
-    let squares = Squares { seen, depth: &depth, inverse_response, world_from_camera, alpha };
+    let depth = depth_to_seed(seen, |pixel| is_open(pixel % width, pixel / width), *source);
+    let squares = Squares { seen, depth: &depth, inverse_response, gain: *gain, world_from_camera, alpha };
     let region = seen.region;
     for top in (region.top..region.bottom).step_by(LARGEST) {
         for left in (region.left..region.right).step_by(LARGEST) {
@@ -110,6 +110,8 @@ struct Squares<'a> {
     /// Depth without noise, metres.
     depth: &'a [f32],
     inverse_response: &'a InverseResponse,
+    /// Gain on the map's light that gives that of `seen`.
+    gain: f32,
     world_from_camera: &'a RigidTransform,
     alpha: &'a [f32],
 }
@@ -155,10 +157,11 @@ impl Squares<'_> {
         let mut depths = Vec::with_capacity((right - left) * (bottom - top));
         for pixel in pixels {
             let bytes = self.seen.colour.each_ref().map(|plane| plane[pixel]);
+            let through = self.gain * self.seen.falloff.as_ref().map_or(1.0, |falloff| falloff[pixel]);
             light
                 .iter_mut()
                 .zip(bytes)
-                .for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte));
+                .for_each(|(sum, byte)| *sum += self.inverse_response.linear_light(byte) / through);
             let grey = bytes.iter().map(|&byte| f32::from(byte)).sum::<f32>() / (3.0 * 255.0);
             (sum, squares, count) = (sum + grey, squares + grey * grey, count + 1.0);
             if self.depth[pixel] > 0.0 {
@@ -194,6 +197,7 @@ mod tests {
     use mba_tracker::image::PixelRectangle;
 
     use super::*;
+    use crate::exposure::RowTimes;
 
     /// A grey wall at 2 m with a striped square, and a hole in its depth.
     fn observation() -> Observation {
@@ -206,6 +210,8 @@ mod tests {
             colour: [plane.clone(), plane.clone(), plane],
             depth: pixels().map(|(x, y)| if x >= 48 && y >= 32 { 0.0 } else { 2.0 }).collect(),
             region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+            times: RowTimes::GLOBAL,
+            falloff: None,
         }
     }
 
@@ -214,7 +220,8 @@ mod tests {
         let alpha = vec![covered; 64 * 48];
         let pose = RigidTransform { translation: Vector3::new(0.0, 0.0, 5.0), ..RigidTransform::identity() };
         let response = InverseResponse::linear();
-        let added = seed(&mut map, &seen, &response, &pose, &alpha, source, room);
+        let view = SeedView { index: 0, seen: &seen, world_from_camera: pose, gain: 1.0, source };
+        let added = seed(&mut map, &view, &response, &alpha, room);
         assert_eq!(added, map.len());
         map
     }

@@ -57,6 +57,7 @@ mod tests {
     use mba_tracker::image::PixelRectangle;
 
     use super::*;
+    use crate::exposure::RowTimes;
 
     const SIZE: [usize; 2] = [32, 24];
 
@@ -67,6 +68,8 @@ mod tests {
             colour: [const { Vec::new() }; 3],
             depth: (0..width * height).map(|pixel| depth(pixel % width, pixel / width)).collect(),
             region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+            times: RowTimes::GLOBAL,
+            falloff: None,
         }
     }
 

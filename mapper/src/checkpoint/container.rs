@@ -46,7 +46,7 @@ pub fn save(path: &Path, identity: &Identity, value: &impl Serialize) -> Result<
 /// # Errors
 /// All of [`CheckpointError`] but `Unencodable`; of several defects the one that explains the others.
 pub fn load<T: DeserializeOwned>(path: &Path, identity: &Identity) -> Result<T, CheckpointError> {
-    let bytes = read(path)?;
+    let bytes = read(path, &MAGIC)?;
     let content = |reason| CheckpointError::Content { path: path.to_owned(), reason };
     match postcard::take_from_bytes(payload(path, identity, &bytes)?) {
         Ok((value, [])) => Ok(value),

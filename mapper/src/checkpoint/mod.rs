@@ -18,6 +18,7 @@
 mod container;
 mod error;
 pub mod exact_floats;
+pub(crate) mod exact_poses;
 mod identity;
 
 pub use container::{load, save};

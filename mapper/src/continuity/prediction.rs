@@ -24,6 +24,18 @@ pub struct MotionPrediction {
     pub rotation_sigma: f64,
 }
 
+impl MotionPrediction {
+    /// The prediction for `factor` times the time.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            motion: self.motion * factor,
+            translation_sigma: self.translation_sigma * factor,
+            rotation_sigma: self.rotation_sigma * factor,
+        }
+    }
+}
+
 /// Predicts the motion during every exposure from the mid-exposure poses of the frames around it; `None` for lost frames
 /// and where one neighbour is lost or further away than the settings bridge.
 ///

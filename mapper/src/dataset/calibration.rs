@@ -141,6 +141,15 @@ const MAX_FOCAL_IN_WIDTHS: f64 = 100.0;
 /// Largest plausible image side in pixels, so that absurd sizes do not ask for absurd memory.
 const MAX_SIDE: usize = 16_384;
 
+/// Most pixels of an image: eight times those of the largest depth cameras.
+pub(crate) const MAX_PIXELS: usize = 64_000_000;
+
+/// Most raw units of depth per metre: 16 bits then reach to 6 cm.
+const MAX_DEPTH_SCALE: f64 = 1e6;
+
+/// Distances from the centre at which a lens is checked.
+const LENS_SAMPLES: u32 = 64;
+
 /// Longest readout of a sensor, seconds either way: three times that of slow telephones.
 const MAX_READOUT: f64 = 0.1;
 
@@ -238,13 +247,40 @@ impl Calibration {
         if let Some(bad) = [k1, k2, p1, p2, k3].into_iter().find(|k| !k.is_finite()) {
             return Err(invalid("distortion", bad, "finite numbers"));
         }
-        check_positive("depth_scale", self.depth_scale, "a positive number of raw units per metre")?;
+        self.check_lens()?;
+        // Written so that NaN is refused.
+        if !(self.depth_scale > 1.0 && self.depth_scale <= MAX_DEPTH_SCALE) {
+            let expected = "a positive number of raw units per metre, above 1 and at most 1000000 (millimetres are 1000)";
+            return Err(invalid("depth_scale", self.depth_scale, expected));
+        }
         check_positive("frame_rate", self.frame_rate, "a positive number of frames per second")?;
         if let ExposureSource::Constant { seconds } | ExposureSource::Assumed { seconds } = self.exposure {
             check_exposure(seconds)?;
         }
         self.check_times()?;
         self.check_optics()
+    }
+
+    /// Checks that the lens maps directions further out to pixels further out, as far as its edges: where it folds
+    /// over, a pixel has two directions. Corners may, as polynomials of low order do there.
+    fn check_lens(&self) -> Result<(), InvalidValue> {
+        let PinholeCamera { width, height, fx, fy, cx, cy } = self.camera;
+        let Distortion { k1, k2, k3, .. } = self.distortion;
+        let reach = |centre: f64, side: usize, focal: f64| {
+            centre.abs().max((side as f64 - 1.0 - centre).abs()) / focal
+        };
+        let farthest = reach(cx, width, fx).max(reach(cy, height, fy));
+        let folds = |step: u32| {
+            let r2 = (farthest * f64::from(step) / f64::from(LENS_SAMPLES)).powi(2);
+            // The derivative of r (1 + k1 r^2 + k2 r^4 + k3 r^6).
+            1.0 + r2 * (3.0 * k1 + r2 * (5.0 * k2 + r2 * 7.0 * k3)) <= 0.0
+        };
+        if (0..=LENS_SAMPLES).any(folds) {
+            let value = format!("[{k1}, {k2}, .., {k3}]");
+            let expected = "k1 k2 p1 p2 k3 of a lens that does not fold the image over";
+            return Err(InvalidValue { key: "distortion", value, expected });
+        }
+        Ok(())
     }
 
     /// Checks readout and delay.
@@ -334,6 +370,9 @@ pub(crate) fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
         if side == 0 || side > MAX_SIDE {
             return Err(invalid(key, side, "a size from 1 to 16384 pixels"));
         }
+    }
+    if camera.width * camera.height > MAX_PIXELS {
+        return Err(invalid("width", camera.width, "a size of at most 64 million pixels"));
     }
     let (width, height) = (camera.width as f64, camera.height as f64);
     for (key, focal) in [("fx", camera.fx), ("fy", camera.fy)] {

@@ -141,7 +141,7 @@ mod tests {
     fn every_key_comes_back_exactly() {
         let table = std::array::from_fn(|code| (code as f32 / 255.0).powf(1.7) + 1e-4 * code as f32);
         let mut calibration = bare();
-        calibration.distortion = Distortion { k1: 0.2624, k2: -0.9531, p1: -0.0054, p2: 0.1 + 0.2, k3: 1e-7 };
+        calibration.distortion = Distortion { k1: 0.2624, k2: -0.4531, p1: -0.0054, p2: 0.1 + 0.2, k3: 1e-7 };
         calibration.exposure = ExposureSource::Constant { seconds: 1.0 / 61.0 };
         calibration.response = Response::Table(Box::new(InverseResponse::from_table(&table).unwrap()));
         calibration.readout = Readout::Rolling { seconds: Some(-0.02 / 3.0) };

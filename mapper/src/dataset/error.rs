@@ -125,6 +125,19 @@ pub enum FrameError {
         /// What the operating system says.
         reason: io::Error,
     },
+    /// The path leads to something that is no file, or to a file of absurd size.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The image claims more pixels than any has.
+    #[error("{path} has {} x {} pixels, more than the {limit} that are read", .found.0, .found.1)]
+    TooManyPixels {
+        /// The image.
+        path: PathBuf,
+        /// Width and height in its header.
+        found: (usize, usize),
+        /// Most pixels.
+        limit: usize,
+    },
     /// An image is truncated or otherwise damaged.
     #[error("{path} is damaged or cut off: {reason}")]
     Damaged {
@@ -268,6 +281,14 @@ pub enum Warning {
         longest: f64,
         /// Timestamp before the longest gap, seconds.
         after: f64,
+    },
+    /// Lines of recorded poses that are no poses.
+    #[error("{count} lines of recorded poses are left out, the first because {first}")]
+    PosesLeftOut {
+        /// How many.
+        count: usize,
+        /// What is wrong with the first, with file and line.
+        first: String,
     },
     /// Frames whose recorded pose is marked as unknown.
     #[error("{count} frames have no valid recorded pose, first {first}")]

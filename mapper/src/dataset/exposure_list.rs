@@ -8,7 +8,7 @@ use super::sequence::FrameEntry;
 use super::{Calibration, DatasetError, Warning};
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
-use crate::whole_file::write_whole;
+use crate::whole_file::write_text;
 
 const FILE_NAME: &str = "exposures.csv";
 const HEADER: &str = "a header line with the columns timestamp and exposure_s";
@@ -98,5 +98,5 @@ fn row(line: &Line<'_>, columns: [usize; 2]) -> Result<[f64; 2], FileError> {
 pub fn write_exposure_times(path: &Path, times_and_exposures: &[(f64, f64)]) -> Result<(), FileError> {
     let row = |(time, exposure): &(f64, f64)| format!("{time:?},{exposure:?}\n");
     let rows: String = times_and_exposures.iter().map(row).collect();
-    write_whole(path, &format!("timestamp,exposure_s\n{rows}"))
+    write_text(path, &format!("timestamp,exposure_s\n{rows}"))
 }

@@ -1,12 +1,16 @@
 //! One RGB-D frame and how its two images are decoded.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
-use super::FrameError;
+use super::{FrameError, MAX_PIXELS};
+use crate::FileError;
+use crate::whole_file::read_at_most;
+
+/// Bytes of the largest file of an image that is read.
+const LARGEST_FILE: u64 = 256 << 20;
 
 /// Colour and depth of one moment, undistorted and of the size of the calibration's camera.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,14 +59,27 @@ pub(super) fn read_depth(path: &Path, size: (usize, usize)) -> Result<Vec<u16>, 
 
 /// Width and height from the header of an image, if it has one.
 pub(super) fn image_size(path: &Path) -> Option<(usize, usize)> {
+    // A pipe or device may have no end.
+    if !path.is_file() {
+        return None;
+    }
     let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
     Some((width as usize, height as usize))
 }
 
-/// Decodes an image of any size and pixel type.
-pub(crate) fn read_image(path: &Path) -> Result<DynamicImage, FrameError> {
-    decode_checked(path, |_, _| Ok(()))
+/// Decodes an image of any pixel type and of up to 64 million pixels.
+///
+/// # Errors
+///
+/// [`FrameError`] if it is missing, damaged or too large.
+pub fn read_image(path: &Path) -> Result<DynamicImage, FrameError> {
+    decode_checked(path, |found, _| match found {
+        (width, height) if width.saturating_mul(height) > MAX_PIXELS => {
+            Err(FrameError::TooManyPixels { path: path.to_owned(), found, limit: MAX_PIXELS })
+        }
+        _ => Ok(()),
+    })
 }
 
 /// Decodes an image after its size and `check` of its pixel type have been found good.
@@ -89,7 +106,10 @@ fn decode_checked(
         let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
         FrameError::Damaged { path: path.to_owned(), reason }
     };
-    let bytes = fs::read(path).map_err(|reason| FrameError::Unreadable { path: path.to_owned(), reason })?;
+    let bytes = read_at_most(path, LARGEST_FILE).map_err(|error| match error {
+        FileError::Unreadable { path, reason } => FrameError::Unreadable { path, reason },
+        other => other.into(),
+    })?;
     let reader = ImageReader::new(Cursor::new(&bytes))
         .with_guessed_format()
         .map_err(|error| damaged(error.to_string()))?;

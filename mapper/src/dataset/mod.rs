@@ -45,12 +45,12 @@ pub use calibration::{
     ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Readout,
     Response, assumed_exposure_seconds,
 };
-pub(crate) use calibration::{check_camera, check_positive};
+pub(crate) use calibration::{MAX_PIXELS, check_camera, check_positive};
 pub use calibration_text::write_calibration;
 pub use error::{DatasetError, FrameError, Warning};
 pub use exposure_list::{read_exposure_times, write_exposure_times};
 pub use frame::RgbdFrame;
-pub(crate) use frame::read_image;
+pub use frame::read_image;
 pub use knowledge::{CalibrationSources, CameraFact, Knowledge};
 pub(crate) use response_table::to_text as response_text;
 pub use sequence::Dataset;
@@ -79,6 +79,12 @@ impl Default for OpenOptions {
 /// make no sense. What is merely odd ends up in [`Dataset::warnings`].
 pub fn open(folder: &Path) -> Result<Dataset, DatasetError> {
     open_with(folder, &OpenOptions::default())
+}
+
+/// Whether `folder` looks like a data set: it has the lists or folders by which a layout is recognised.
+#[must_use]
+pub fn is_data_set(folder: &Path) -> bool {
+    tum::recognise(folder) || replica::recognise(folder) || scannet::recognise(folder)
 }
 
 /// As [`open`], with options.

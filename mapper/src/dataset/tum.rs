@@ -8,7 +8,9 @@ use super::sequence::{Contents, FrameEntry, frames_per_second};
 use super::{Calibration, DatasetError, OpenOptions, Warning, calibration_file, exposure_list};
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
-use crate::trajectory_file::{TimedExposure, TimedPose, read_exposures, read_trajectory};
+use crate::trajectory_file::{
+    Recorded, TimedExposure, TimedPose, read_recorded_exposures, read_recorded_trajectory,
+};
 
 const ASSOCIATIONS: &str = "associations.txt";
 const COLOUR_LIST: &str = "rgb.txt";
@@ -24,14 +26,15 @@ struct ListedImage<'a> {
 /// Whether `folder` looks like this layout.
 pub(super) fn recognise(folder: &Path) -> bool {
     let has = |name| folder.join(name).is_file();
-    has(ASSOCIATIONS) || (has(COLOUR_LIST) && has(DEPTH_LIST))
+    // Also one that is a folder or a link to nothing: reading it says so, and nothing else is taken in its place.
+    folder.join(ASSOCIATIONS).symlink_metadata().is_ok() || (has(COLOUR_LIST) && has(DEPTH_LIST))
 }
 
 /// Reads lists, calibration and ground truth.
 pub(super) fn read(folder: &Path, options: &OpenOptions) -> Result<Contents, DatasetError> {
     let mut warnings = Vec::new();
     let associations = folder.join(ASSOCIATIONS);
-    let mut entries = if associations.is_file() {
+    let mut entries = if associations.symlink_metadata().is_ok() {
         read_associations(folder, &associations, options, &mut warnings)?
     } else {
         associate_lists(folder, options, &mut warnings)?
@@ -189,9 +192,13 @@ fn read_ground_truth(
 ) -> Result<(Vec<TimedPose>, Vec<TimedExposure>), DatasetError> {
     let (poses_path, exposures_path) =
         (folder.join("groundtruth.txt"), folder.join("groundtruth_exposure.txt"));
-    let exposures = if exposures_path.is_file() { read_exposures(&exposures_path)? } else { Vec::new() };
+    let exposures = if exposures_path.is_file() {
+        sound(read_recorded_exposures(&exposures_path)?, warnings)
+    } else {
+        Vec::new()
+    };
     let poses = if poses_path.is_file() {
-        read_trajectory(&poses_path)?
+        sound(read_recorded_trajectory(&poses_path)?, warnings)
     } else {
         let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };
         exposures.iter().map(mid).collect()
@@ -202,4 +209,12 @@ fn read_ground_truth(
         warnings.push(Warning::GroundTruthElsewhere { path: poses_path });
     }
     Ok((poses, exposures))
+}
+
+/// The good poses; what is not is counted in a warning.
+fn sound<T>(recorded: Recorded<T>, warnings: &mut Vec<Warning>) -> Vec<T> {
+    if let Some(first) = recorded.first_error {
+        warnings.push(Warning::PosesLeftOut { count: recorded.left_out, first: first.to_string() });
+    }
+    recorded.poses
 }

@@ -284,6 +284,10 @@ fn median_measured(values: &[f32]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn timed(path: &ExposureTrajectory) -> TimedExposure {
+        TimedExposure { timestamp: 0.0, start: path.start, mid: path.mid(), end: path.end }
+    }
     use crate::evaluation::psnr;
     use crate::synth::{SynthConfig, SynthSequence};
 
@@ -305,7 +309,7 @@ mod tests {
         let mut memory = deblurrer.memory();
         for index in 0..sequence.len() {
             let frame = sequence.render_frame(index).into_captured(0);
-            let deblurred = deblurrer.deblur(&frame, &sequence.exposure(index), &mut memory).unwrap();
+            let deblurred = deblurrer.deblur(&frame, &timed(&sequence.exposure(index)), &mut memory).unwrap();
             let truth = sequence.render_sharp(index);
             let [before, after] = [&frame.rgb, &deblurred.rgb].map(|image| psnr(&truth, image).unwrap());
             assert!(
@@ -323,7 +327,8 @@ mod tests {
         grey.for_each(|(k, byte)| *byte = if k / 3 % 160 < 10 { 0 } else { 150 });
         let region = PixelRectangle { left: 10, top: 0, right: 160, bottom: 120 };
         let deblurrer = KeyframeDeblurrer { region, ..deblurrer(&sequence) };
-        let deblurred = deblurrer.deblur(&frame, &sequence.exposure(0), &mut deblurrer.memory()).unwrap();
+        let deblurred =
+            deblurrer.deblur(&frame, &timed(&sequence.exposure(0)), &mut deblurrer.memory()).unwrap();
         assert_eq!(deblurred.rgb, frame.rgb);
     }
 
@@ -333,7 +338,7 @@ mod tests {
         let deblurrer = deblurrer(&sequence);
         let frame = sequence.render_frame(0).into_captured(0);
         let still = ExposureTrajectory::still(sequence.exposure(0).mid());
-        let deblurred = deblurrer.deblur(&frame, &still, &mut deblurrer.memory()).unwrap();
+        let deblurred = deblurrer.deblur(&frame, &timed(&still), &mut deblurrer.memory()).unwrap();
         assert_eq!(deblurred, Deblurred { rgb: frame.rgb, sharpened: false });
     }
 
@@ -343,7 +348,7 @@ mod tests {
         let deblurrer = deblurrer(&sequence);
         let still = ExposureTrajectory::still(sequence.exposure(0).mid());
         let refused =
-            |frame: &RgbdFrame| deblurrer.deblur(frame, &still, &mut deblurrer.memory()).unwrap_err();
+            |frame: &RgbdFrame| deblurrer.deblur(frame, &timed(&still), &mut deblurrer.memory()).unwrap_err();
         let good = sequence.render_frame(0).into_captured(0);
         let narrow = RgbdFrame { width: 159, ..good.clone() };
         assert!(matches!(refused(&narrow), DeblurError::Size { found: (159, 120), expected: (160, 120) }));

@@ -48,7 +48,7 @@ impl ExposurePath {
         TimedExposure { timestamp, start: self.ends.start, mid: self.mid(), end: self.ends.end }
     }
 
-    /// `world_from_camera` at normalised time `s` in `[0, 1]`.
+    /// `world_from_camera` at normalised time `s`, 0 at opening to 1 at closing; the motion goes on outside.
     #[must_use]
     pub fn at(&self, s: f64) -> RigidTransform {
         self.ends.at(s).perturbed(&(self.bow * height(s)))
@@ -81,6 +81,18 @@ impl ExposurePath {
     pub fn perturbed(&self, step: &SMatrix<f64, PATH_PARAMETERS, 1>) -> Self {
         let ends = self.ends.perturbed(&step.fixed_rows::<12>(0).into_owned());
         Self { ends, bow: self.bow + step.fixed_rows::<6>(12) }
+    }
+
+    /// The path over `factor` times the time around the same middle: through where this one goes at its new opening and
+    /// closing. A factor of 1 gives the same path, bit for bit.
+    #[must_use]
+    pub fn stretched(&self, factor: f64) -> Self {
+        if factor == 1.0 {
+            return *self;
+        }
+        let [start, mid, end] = [0.5 - 0.5 * factor, 0.5, 0.5 + 0.5 * factor].map(|s| self.at(s));
+        let ends = ExposureTrajectory { start, end };
+        Self { ends, bow: ends.mid().tangent_to(&mid) }
     }
 
     /// The same path in another world.
@@ -116,7 +128,7 @@ mod tests {
     #[test]
     fn the_jacobian_is_that_of_finite_differences() {
         let (path, step) = (path(), 1e-6);
-        for s in [0.0, 0.2, 0.5, 0.9] {
+        for s in [-0.7, 0.0, 0.2, 0.5, 0.9, 1.4] {
             let jacobian = path.pose_jacobian(s);
             for k in 0..PATH_PARAMETERS {
                 let mut tangent = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
@@ -136,6 +148,19 @@ mod tests {
         assert!((again.bow - path().bow).norm() < 1e-12);
         assert!(again.mid().tangent_to(&exposure.mid).norm() < 1e-12);
         assert_eq!(again.timed(4.5).start, exposure.start);
+    }
+
+    #[test]
+    fn a_stretched_path_goes_the_same_way() {
+        let long = path().stretched(2.5);
+        for s in [-0.7, 0.0, 0.3, 0.5, 1.0, 1.6] {
+            let apart = path().at(s).tangent_to(&long.at(0.5 + (s - 0.5) / 2.5)).norm();
+            // Rotations of ends and bow do not commute: the two differ by products of angles.
+            assert!(apart < 4e-3, "{apart} at {s}");
+        }
+        assert!(long.mid().tangent_to(&path().mid()).norm() < 1e-12);
+        assert!(long.stretched(0.4).mid().tangent_to(&path().mid()).norm() < 1e-12);
+        assert_eq!(path().stretched(1.0), path());
     }
 
     #[test]

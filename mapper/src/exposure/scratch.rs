@@ -14,6 +14,10 @@ pub struct ExposureScratch {
     pub(super) rasters: Vec<RasterScratch>,
     /// The poses of the views in use.
     pub(super) poses: Vec<VirtualPose>,
+    /// Weight of every view in the colour of every row, for views that do not count alike; none for those of depth.
+    pub(super) row_weights: Vec<Vec<f32>>,
+    /// Views of colour; those of depth follow.
+    pub(super) colour_views: usize,
     pub(super) pose_sums: PoseSums,
     /// By Gaussian.
     pub(super) drawn: Vec<bool>,
@@ -40,7 +44,7 @@ impl ExposureScratch {
         &self.drawn
     }
 
-    /// Number of virtual views of the last exposure; odd.
+    /// Number of views of the last exposure, those of depth included.
     #[must_use]
     pub fn views(&self) -> usize {
         self.poses.len()

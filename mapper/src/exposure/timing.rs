@@ -56,6 +56,12 @@ impl RowTimes {
     /// A frame whose path is its exposure, whose rows are exposed together, and whose depth is that of mid exposure.
     pub const GLOBAL: Self = Self { exposure: 1.0, readout: 0.0, depth_offset: 0.0, depth_readout: 0.0 };
 
+    /// Whether all rows are exposed together over the whole path, with depth of the middle.
+    #[must_use]
+    pub fn is_global(&self) -> bool {
+        *self == Self::GLOBAL
+    }
+
     /// Path time of the virtual view at `s` of the exposure, 0 at opening to 1 at closing, for the row at `v` of
     /// `height`; rows count from the centre of the first.
     #[must_use]

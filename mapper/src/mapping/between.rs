@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 
 use super::MapSettings;
 use super::prepare::{Frames, observation, sensor};
-use crate::bundle::{BundleAdjustment, Keyframe, PathPrior};
+use crate::bundle::{BundleAdjustment, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
 use crate::dataset::Dataset;
 use crate::run::FrameStatus;
 use crate::trajectory_file::TimedExposure;
@@ -43,12 +43,11 @@ pub(super) fn all_exposures(
     let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
     let sensor = sensor(dataset);
     let mut all = Vec::with_capacity(dataset.len());
-    for (index, tracked) in frames.exposures.iter().enumerate() {
-        let timestamp = tracked.timestamp;
+    for index in 0..frames.exposures.len() {
         let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
         if keyframes[next] == index {
             let state = &bundle.state.frames[next];
-            all.push((state.path.timed(timestamp), state.log_gain));
+            all.push((frames.exposure_of(index, state), state.log_gain));
             continue;
         }
         let nearest = nearest(&keyframes, next, index);
@@ -66,9 +65,18 @@ pub(super) fn all_exposures(
                 observation,
                 PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },
             );
+            let known = &bundle.keyframes()[nearest].observation;
+            let here = Placed { seen: unmapped.observation.level(1), world_from_camera: state.path.mid() };
+            let there =
+                Placed { seen: known.level(1), world_from_camera: bundle.state.frames[nearest].path.mid() };
+            if let Some(ratio) = log_brightness(&sensor.inverse_response, there, here)
+                && ratio.abs() > NOTICEABLE
+            {
+                state.log_gain += ratio;
+            }
             bundle.fit_frame(&unmapped, &mut state, STEPS);
         }
-        all.push((state.path.timed(timestamp), state.log_gain));
+        all.push((frames.exposure_of(index, &state), state.log_gain));
     }
     all
 }

@@ -1,6 +1,6 @@
 //! The run from start to end.
 
-use std::path::Path;
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
@@ -9,15 +9,16 @@ use super::between::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, merit, output};
 use crate::bundle::{BundleAdjustment, BundleState, MapSize};
-use crate::checkpoint::{Fingerprint, Identity, load, save};
+use crate::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use crate::dataset::Dataset;
+use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
 
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.
 pub(super) const BUDGET_RESERVE: f64 = 0.1;
 
 /// Layout of the checkpoint's content.
-const CHECKPOINT_VERSION: u32 = 3;
+const CHECKPOINT_VERSION: u32 = 4;
 
 /// Memory of the smoothed loss, steps.
 const SMOOTHING: f64 = 50.0;
@@ -44,9 +45,16 @@ struct Saved {
     running: Running,
 }
 
+/// The same as it is written.
+#[derive(Serialize)]
+struct Saving<'a> {
+    state: &'a BundleState,
+    running: Running,
+}
+
 /// What the driver keeps of the steps: seconds for the map so far, and smoothed figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Running {
+pub(crate) struct Running {
     pub(super) seconds: f64,
     loss: f64,
     mean_square: f64,
@@ -61,23 +69,24 @@ impl Running {
 }
 
 /// Maps `dataset` from the poses of `run` into the RUN folder `out`. With `resume`, goes on from the checkpoint in
-/// `out` if there is one. `describe` becomes the settings of the new run; `observe` is called after every step.
+/// `out` if there is one. `describe` becomes the settings of the new run; `observe` is called after every step and says
+/// whether to go on.
 ///
 /// # Errors
-/// See [`MapError`]. What was done before stays in `out`.
+/// See [`MapError`]. What was done before stays in `out`, and an earlier run until it is known that there will be a map.
 pub fn map_dataset(
     dataset: &Dataset,
     run: &Run,
     settings: &MapSettings,
-    out: &Path,
+    out: OutputFolder,
     resume: bool,
     describe: RunSettings,
-    mut observe: impl FnMut(MapProgress),
+    mut observe: impl FnMut(MapProgress) -> ControlFlow<()>,
 ) -> Result<Summary, MapError> {
     let started = Instant::now();
     let mut frames = Frames::new(dataset, run, settings.continuity)?;
     let identity = identity(dataset, run, settings);
-    let checkpoint = out.join(CHECKPOINT_FILE);
+    let checkpoint = out.path().join(CHECKPOINT_FILE);
     let saved: Option<Saved> =
         if resume && checkpoint.is_file() { Some(load(&checkpoint, &identity)?) } else { None };
     let mut bundle = prepare::bundle(dataset, &mut frames, settings)?;
@@ -94,15 +103,14 @@ pub fn map_dataset(
     output::push_tracked(&mut writer, &frames)?;
     let earlier = running.seconds;
     let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
-    let checkpoint =
-        Checkpoint { path: &checkpoint, identity: &identity, interval: settings.checkpoint_interval };
+    let keep =
+        |state: &BundleState, running: Running| save(&checkpoint, &identity, &Saving { state, running });
+    let checkpoint = Checkpoint { interval: settings.checkpoint_interval, keep: &keep };
     let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
     adjustment.run(&mut bundle, &mut running, &mut observe)?;
     running.seconds = adjustment.seconds();
     let conclusion = Conclusion { dataset, frames, settings, fit: Fit::Tracked };
-    let summary = conclusion.write(bundle, writer, running, |_| ())?;
-    RunWriter::remove_checkpoint(out)?;
-    Ok(summary)
+    conclusion.write(bundle, writer, running, |_| ())
 }
 
 /// What is left to do when the map is finished.
@@ -162,21 +170,27 @@ pub(super) struct Adjustment<'a> {
     pub(super) earlier: f64,
 }
 
-/// Where the state is kept while the loop runs.
-pub(super) struct Checkpoint<'a> {
-    path: &'a Path,
-    identity: &'a Identity,
-    interval: Duration,
+/// How the state is kept while the loop runs.
+#[derive(Clone, Copy)]
+pub(crate) struct Checkpoint<'a> {
+    /// Time between two checkpoints.
+    pub(crate) interval: Duration,
+    /// Writes one.
+    pub(crate) keep: &'a Keep<'a>,
 }
+
+/// Writes a checkpoint of a bundle and of what the loop keeps besides.
+type Keep<'a> = dyn Fn(&BundleState, Running) -> Result<(), CheckpointError> + 'a;
 
 impl Adjustment<'_> {
     pub(super) fn run(
         &self,
         bundle: &mut BundleAdjustment,
         running: &mut Running,
-        observe: &mut impl FnMut(MapProgress),
+        observe: &mut impl FnMut(MapProgress) -> ControlFlow<()>,
     ) -> Result<(), MapError> {
-        let mut last_saved = Instant::now();
+        // The first checkpoint follows the first step: reading the frames is not to be lost either.
+        let mut last_saved: Option<Instant> = None;
         while bundle.state.position < 1.0 {
             let steps = bundle.state.scheduled_steps + 1;
             let report = bundle.step(self.budget.is_some(), |schedule| match self.budget {
@@ -185,21 +199,26 @@ impl Adjustment<'_> {
             });
             let Some(report) = report else { break };
             running.add(report.terms.total(), report.terms.mean_square, steps);
-            observe(MapProgress {
+            let flow = observe(MapProgress {
                 position: bundle.state.position.min(1.0),
                 steps: bundle.state.steps,
                 size: bundle.state.map.size(),
                 loss: running.loss,
                 psnr: -10.0 * running.mean_square.log10(),
             });
+            let is_due = |interval| last_saved.is_none_or(|saved| saved.elapsed() >= interval);
             if let Some(checkpoint) = &self.checkpoint
-                && last_saved.elapsed() >= checkpoint.interval
+                && (flow.is_break() || is_due(checkpoint.interval))
             {
                 self.save(checkpoint, bundle, running)?;
-                last_saved = Instant::now();
+                last_saved = Some(Instant::now());
+            }
+            if flow.is_break() {
+                return Err(MapError::Stopped);
             }
         }
-        Ok(())
+        // Frames between keyframes and files take time too; a run that is killed there does not repeat the steps.
+        self.checkpoint.iter().try_for_each(|checkpoint| self.save(checkpoint, bundle, running))
     }
 
     /// Time for the map so far, earlier parts of the run included.
@@ -213,28 +232,26 @@ impl Adjustment<'_> {
         bundle: &BundleAdjustment,
         running: &Running,
     ) -> Result<(), MapError> {
-        #[derive(Serialize)]
-        struct Saving<'a> {
-            state: &'a BundleState,
-            running: Running,
-        }
         let running = Running { seconds: self.seconds(), ..*running };
-        save(checkpoint.path, checkpoint.identity, &Saving { state: &bundle.state, running })?;
-        Ok(())
+        Ok((checkpoint.keep)(&bundle.state, running)?)
     }
 }
 
 /// What a checkpoint has to agree with.
 fn identity(dataset: &Dataset, run: &Run, settings: &MapSettings) -> Identity {
-    let calibration = dataset.calibration();
-    let camera = calibration.camera;
-    let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
+    let camera = dataset.calibration().camera;
     let exposures: Vec<String> = run.exposures.iter().map(|exposure| format!("{exposure:?}")).collect();
     let records: Vec<String> = run.frames.iter().map(|record| format!("{record:?}")).collect();
     Identity {
         program: Fingerprint::of(&(env!("CARGO_PKG_VERSION"), CHECKPOINT_VERSION)),
-        dataset: Fingerprint::of(&(dataset.name(), format!("{calibration:?}"), stamps)),
+        dataset: dataset_fingerprint(dataset),
         trajectory: Fingerprint::of(&(exposures, records)),
         settings: Fingerprint::of(&settings.decisive(camera.width * camera.height)),
     }
+}
+
+/// What a data set is, wherever it lies: it may move between two parts of a run.
+pub(crate) fn dataset_fingerprint(dataset: &Dataset) -> Fingerprint {
+    let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
+    Fingerprint::of(&(format!("{:?}", dataset.calibration()), stamps))
 }

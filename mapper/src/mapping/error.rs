@@ -38,6 +38,9 @@ pub enum MapError {
     /// The checkpoint cannot be used or written.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+    /// Whoever watches asked for it; a checkpoint was written.
+    #[error("stopped on request")]
+    Stopped,
     /// The results cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),

@@ -6,10 +6,13 @@ use super::prepare::{observation_of, sensor};
 use crate::bundle::{Observation, Sensor};
 use crate::continuity::{FramePicture, Mismatch, Suspicion, compare_exposures};
 use crate::dataset::Dataset;
-use crate::exposure::{RowTimes, RowTiming};
+use crate::exposure::RowTimes;
 
 /// Widest picture that is compared, pixels: misplaced frames are off by more than a pixel of it.
 const WIDEST: usize = 320;
+
+/// A corner that gets less of the light than this is not made brighter any more: there is hardly anything but noise.
+const LEAST_SHARE: f32 = 0.05;
 
 /// Compares exposures of the frames of a data set by what the frames show.
 pub(super) struct FrameEvidence<'a> {
@@ -37,20 +40,20 @@ impl<'a> FrameEvidence<'a> {
 
     fn picture(&self, index: usize) -> Option<FramePicture> {
         let pyramid = observation_of(self.dataset, &self.sensor, index, self.level + 1).ok()?;
-        let Observation { camera, colour, depth, .. } = pyramid.level(self.level);
+        let Observation { camera, colour, depth, falloff, .. } = pyramid.level(self.level);
         let [red, green, blue] = colour;
         let light = |byte: &u8| self.sensor.inverse_response.linear_light(*byte);
         let mean = |((red, green), blue): ((&u8, &u8), &u8)| (light(red) + light(green) + light(blue)) / 3.0;
-        Some(FramePicture {
-            camera: *camera,
-            light: red.iter().zip(green).zip(blue).map(mean).collect(),
-            depth: depth.clone(),
-            times: self.times(index),
-        })
+        let mut light: Vec<f32> = red.iter().zip(green).zip(blue).map(mean).collect();
+        if let Some(falloff) = falloff {
+            light.iter_mut().zip(falloff.iter()).for_each(|(light, share)| *light /= share.max(LEAST_SHARE));
+        }
+        Some(FramePicture { camera: *camera, light, depth: depth.clone(), times: self.times(index) })
     }
 
     fn times(&self, index: usize) -> RowTimes {
         let seconds = self.dataset.exposure_seconds(index);
-        RowTiming::default().over(seconds, seconds, 0.0)
+        let offset = self.dataset.depth_timestamp(index) - self.dataset.timestamp(index);
+        self.sensor.rows.over(seconds, seconds, offset)
     }
 }

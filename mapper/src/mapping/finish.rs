@@ -1,9 +1,10 @@
 //! From a map that has grown frame by frame to a finished RUN folder.
 
+use std::ops::ControlFlow;
 use std::time::Instant;
 
 use super::between::Fit;
-use super::driver::{Adjustment, BUDGET_RESERVE, Conclusion, Running};
+use super::driver::{Adjustment, BUDGET_RESERVE, Checkpoint, Conclusion, Running};
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
 use crate::bundle::{BundleAdjustment, DepthSource, MapKind, Schedule};
@@ -48,21 +49,41 @@ impl<'a> Finish<'a> {
         Ok(Self { dataset, settings, frames })
     }
 
-    /// Refines, fits the frames between keyframes, and writes everything. `started` is when the run was;
-    /// `more` completes the summary.
+    /// Goes on with a refinement that was stopped after it had begun with a schedule of so many steps: the keyframes are
+    /// told the same, map and paths are left to the caller.
+    pub(crate) fn resume(
+        dataset: &'a Dataset,
+        bundle: &mut BundleAdjustment,
+        exposures: &[TimedExposure],
+        records: &[FrameRecord],
+        (settings, schedule_steps): (&'a MapSettings, usize),
+    ) -> Result<Self, MapError> {
+        let frames = Frames::of(dataset, exposures, records, settings.continuity)?;
+        for k in 0..bundle.keyframes().len() {
+            bundle.set_prior(k, frames.priors[bundle.keyframes()[k].index]);
+        }
+        bundle.start(match settings.kind {
+            MapKind::Gaussians => Schedule::finish(schedule_steps),
+            MapKind::Field => Schedule::field(bundle.keyframes().len()),
+        });
+        Ok(Self { dataset, settings, frames })
+    }
+
+    /// Refines, fits the frames between keyframes, and writes everything. `earlier` is what a part of the refinement
+    /// that was stopped had come to, `seconds` the time of the run so far; `more` completes the summary.
     pub(crate) fn run(
         self,
         mut bundle: BundleAdjustment,
         writer: RunWriter,
-        started: Instant,
-        mut observe: impl FnMut(MapProgress),
+        (earlier, checkpoint, seconds): (Running, Option<Checkpoint<'_>>, impl Fn() -> f64),
+        mut observe: impl FnMut(MapProgress) -> ControlFlow<()>,
         more: impl FnOnce(&mut Summary),
     ) -> Result<Summary, MapError> {
         let budget = self.settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
-        let adjustment = Adjustment { budget, checkpoint: None, started: Instant::now(), earlier: 0.0 };
-        let mut running = Running::default();
+        let adjustment = Adjustment { budget, checkpoint, started: Instant::now(), earlier: earlier.seconds };
+        let mut running = earlier;
         adjustment.run(&mut bundle, &mut running, &mut observe)?;
-        running.seconds = started.elapsed().as_secs_f64();
+        running.seconds = seconds();
         let Self { dataset, settings, frames } = self;
         Conclusion { dataset, frames, settings, fit: Fit::Doubtful }.write(bundle, writer, running, more)
     }

@@ -2,10 +2,8 @@
 
 use std::path::Path;
 
-use image::ImageReader;
-
 use crate::bundle::BundleAdjustment;
-use crate::dataset::Dataset;
+use crate::dataset::{Dataset, read_image};
 use crate::evaluation::{DEFAULT_MAX_DT, align_poses, psnr, ssim};
 use crate::rendering::{Behind, RenderedView, ViewRenderer};
 use crate::run::{MapFigures, deblurred_path, mid_pose};
@@ -104,7 +102,8 @@ fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[Ti
     let map_from_truth = alignment.reference_from_estimate.inverse();
     let calibration = dataset.calibration();
     let (camera, response) = (calibration.camera, calibration.response.inverse());
-    let mut renderer = ViewRenderer::new(&bundle.state.map, camera, &response, calibration.depth_scale);
+    let mut renderer = ViewRenderer::new(&bundle.state.map, camera, &response, calibration.depth_scale)
+        .through(bundle.sensor().falloff.clone());
     for (index, pose) in poses.iter().enumerate() {
         let Some(truth) = read(&folder.join(format!("{index:06}.png"))) else { continue };
         let view = renderer.render(&map_from_truth.compose(&pose.world_from_camera), Behind::Surroundings);
@@ -116,7 +115,7 @@ fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[Ti
 
 /// An image, or none if it cannot be read: then there is no figure for it.
 fn read(path: &Path) -> Option<Picture> {
-    let image = ImageReader::open(path).ok()?.decode().ok()?.into_rgb8();
+    let image = read_image(path).ok()?.into_rgb8();
     let size = [image.width() as usize, image.height() as usize];
     Some(Picture { size, rgb: image.into_raw() })
 }

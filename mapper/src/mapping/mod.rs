@@ -16,6 +16,7 @@ mod output;
 mod prepare;
 mod settings;
 
+pub(crate) use driver::{Checkpoint, Running, dataset_fingerprint};
 pub use driver::{MapProgress, map_dataset};
 pub use error::MapError;
 pub(crate) use finish::Finish;

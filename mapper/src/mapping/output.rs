@@ -11,11 +11,13 @@ use crate::rendering::{Behind, ViewRenderer};
 use crate::run::{RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
 
-/// Fills a run with the poses that it starts from, and brings its folder up to date.
+/// Fills a run with the poses that it starts from, and brings its folder up to date: from here on it replaces an
+/// earlier one.
 pub(super) fn push_tracked(writer: &mut RunWriter, frames: &Frames) -> Result<(), RunError> {
     for (exposure, record) in frames.exposures.iter().zip(&frames.records) {
         writer.push(*exposure, *record)?;
     }
+    writer.replace_earlier()?;
     writer.flush()
 }
 
@@ -35,7 +37,9 @@ pub(super) fn write(
     writer.write_map(&bundle.state.map)?;
     let (camera, response) = (dataset.calibration().camera, dataset.calibration().response.inverse());
     let depth_scale = dataset.calibration().depth_scale;
-    let renderer = || ViewRenderer::new(&bundle.state.map, camera, &response, depth_scale);
+    let falloff = bundle.sensor().falloff.clone();
+    let renderer =
+        || ViewRenderer::new(&bundle.state.map, camera, &response, depth_scale).through(falloff.clone());
     let pairs: Vec<_> = bundle.keyframes().iter().zip(&bundle.state.frames).collect();
     let write = |renderer: &mut ViewRenderer<'_>, (keyframe, frame): (&Keyframe, &FrameState)| {
         let colour = &keyframe.observation.level(0).colour;

@@ -1,19 +1,25 @@
 //! From a run to a bundle that can be adjusted.
 
+use std::sync::Arc;
+
 use mba_tracker::SimdLevel;
+use nalgebra::Vector6;
 use rayon::prelude::*;
 
 use super::choice::choose_keyframes;
 use super::evidence::FrameEvidence;
 use super::{MapError, MapSettings};
-use crate::bundle::{BundleAdjustment, FrameState, Keyframe, ObservationPyramid, PathPrior, Sensor};
+use crate::bundle::{
+    BundleAdjustment, FrameState, Keyframe, NOTICEABLE, ObservationPyramid, PathPrior, Placed, Sensor,
+    log_brightness,
+};
 use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
 };
 use crate::dataset::Dataset;
-use crate::evaluation::motion_of;
-use crate::exposure::ExposurePath;
-use crate::run::{FrameRecord, Run};
+use crate::evaluation::{motion_of, quantile};
+use crate::exposure::{ExposurePath, RowTiming};
+use crate::run::{FrameRecord, FrameStatus, Run};
 use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.
@@ -28,6 +34,10 @@ pub(super) struct Frames {
     pub(super) exposures: Vec<TimedExposure>,
     /// What was said of them when they were tracked.
     pub(super) records: Vec<FrameRecord>,
+    /// First estimates of the paths over all the time in which anything of a frame was measured.
+    paths: Vec<ExposurePath>,
+    /// How many times as long as the exposures the paths are.
+    stretches: Vec<f64>,
     /// What the neighbours say about each motion.
     pub(super) priors: Vec<PathPrior>,
     /// What was odd, one sentence each.
@@ -44,6 +54,12 @@ pub(crate) fn sensor(dataset: &Dataset) -> Sensor {
         inverse_response: calibration.response.inverse(),
         depth_scale: calibration.depth_scale,
         region: dataset.region_with_source(),
+        rows: RowTiming {
+            // Rows of unknown times count as exposed together.
+            readout_seconds: calibration.readout.readout_seconds().unwrap_or(0.0),
+            depth_readout_seconds: calibration.depth_readout_seconds,
+        },
+        falloff: dataset.light_falloff().map(Arc::from),
     }
 }
 
@@ -63,7 +79,10 @@ impl Frames {
         continuity: bool,
     ) -> Result<Self, MapError> {
         if !continuity {
-            return Ok(Self::unrelated(exposures, records));
+            let prior = |exposure| PathPrior { middle: motion_of(exposure).mid(), motion: None };
+            let priors = exposures.iter().map(prior).collect();
+            let (exposures, records) = (exposures.to_vec(), records.to_vec());
+            return Ok(Self::on_paths(dataset, exposures, records, priors, Vec::new(), continuity));
         }
         let seconds = exposure_seconds(dataset);
         let settings = ContinuitySettings::default();
@@ -73,20 +92,45 @@ impl Frames {
         let frames = run_frames(&repaired.exposures, records, &seconds)?;
         let motions = predict_motions(&frames, &settings).into_iter();
         let prior = |(motion, exposure)| PathPrior { middle: motion_of(exposure).mid(), motion };
-        let priors = motions.zip(&repaired.exposures).map(prior).collect();
+        let priors: Vec<PathPrior> = motions.zip(&repaired.exposures).map(prior).collect();
         let warnings = repairs(&repaired, "before");
-        Ok(Self { exposures: repaired.exposures, records: records.to_vec(), priors, warnings, continuity })
+        let records = records.to_vec();
+        Ok(Self::on_paths(dataset, repaired.exposures, records, priors, warnings, continuity))
     }
 
-    fn unrelated(exposures: &[TimedExposure], records: &[FrameRecord]) -> Self {
-        let prior = |exposure| PathPrior { middle: motion_of(exposure).mid(), motion: None };
-        Self {
-            exposures: exposures.to_vec(),
-            records: records.to_vec(),
-            priors: exposures.iter().map(prior).collect(),
-            warnings: Vec::new(),
-            continuity: false,
+    /// Gives every frame a path over all the time in which anything of it was measured.
+    fn on_paths(
+        dataset: &Dataset,
+        exposures: Vec<TimedExposure>,
+        records: Vec<FrameRecord>,
+        mut priors: Vec<PathPrior>,
+        warnings: Vec<String>,
+        continuity: bool,
+    ) -> Self {
+        let sensor = sensor(dataset);
+        let stretch = |index: usize| {
+            let offset = dataset.depth_timestamp(index) - dataset.timestamp(index);
+            sensor.times(dataset.exposure_seconds(index), offset).1
+        };
+        let stretches: Vec<f64> = (0..dataset.len()).map(stretch).collect();
+        let tracked = |index: usize| records[index].status != FrameStatus::Lost;
+        let paths: Vec<ExposurePath> = (0..exposures.len())
+            .map(|index| {
+                let seconds = dataset.exposure_seconds(index);
+                let beside =
+                    |other: Option<usize>| other.filter(|k| tracked(*k)).and_then(|k| exposures.get(k));
+                let neighbours =
+                    [beside(index.checked_sub(1)), beside(Some(index + 1).filter(|k| *k < exposures.len()))];
+                long_path(&exposures[index], neighbours, seconds, stretches[index])
+            })
+            .collect();
+        for ((prior, path), stretch) in priors.iter_mut().zip(&paths).zip(&stretches) {
+            if *stretch != 1.0 {
+                prior.middle = path.ends.mid();
+                prior.motion = prior.motion.map(|motion| motion.times(*stretch));
+            }
         }
+        Self { exposures, records, paths, stretches, priors, warnings, continuity }
     }
 
     /// Repairs exposures that were refined, unless continuity is left out, and tells what was done.
@@ -107,9 +151,14 @@ impl Frames {
         Ok((repaired.exposures, warnings))
     }
 
+    /// The exposure of a frame with that state.
+    pub(super) fn exposure_of(&self, index: usize, state: &FrameState) -> TimedExposure {
+        state.path.stretched(1.0 / self.stretches[index]).timed(self.exposures[index].timestamp)
+    }
+
     /// First estimate of a frame's path.
     pub(super) fn state(&self, index: usize, settings: &MapSettings) -> FrameState {
-        let path = ExposurePath::through(&self.exposures[index]);
+        let path = self.paths[index];
         FrameState::new(if settings.blur { path } else { ExposurePath::still(path.mid()) })
     }
 }
@@ -136,9 +185,32 @@ pub(super) fn bundle(
         let reason = frames.warnings.last().cloned().unwrap_or_else(|| "all frames are lost".to_owned());
         return Err(MapError::NoKeyframe(reason));
     }
-    let states = keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
+    let mut states: Vec<FrameState> =
+        keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
+    set_gains(&sensor, &keyframes, &mut states);
     let pixels = sensor.camera.width * sensor.camera.height;
     Ok(BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(pixels), keyframes, states))
+}
+
+/// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.
+/// The map is as bright as the median keyframe.
+fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState]) {
+    let ratios: Vec<f64> = (1..keyframes.len())
+        .into_par_iter()
+        .map(|k| {
+            let [before, here] = [k - 1, k].map(|k| Placed {
+                seen: keyframes[k].observation.level(1),
+                world_from_camera: states[k].path.mid(),
+            });
+            log_brightness(&sensor.inverse_response, before, here).unwrap_or(0.0)
+        })
+        .collect();
+    let mut log_gains = vec![0.0];
+    ratios.iter().for_each(|ratio| log_gains.push(log_gains[log_gains.len() - 1] + ratio));
+    if log_gains.iter().any(|log_gain| log_gain.abs() > NOTICEABLE) {
+        let median = quantile(&log_gains, 0.5).unwrap_or(0.0);
+        states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain - median);
+    }
 }
 
 /// Reads a frame.
@@ -159,6 +231,37 @@ pub(super) fn observation_of(
 ) -> Result<ObservationPyramid, String> {
     let frame = dataset.frame(index).map_err(|error| error.to_string())?;
     ObservationPyramid::new(sensor, &frame, levels).ok_or_else(|| "its size is not the camera's".to_owned())
+}
+
+/// The path over `stretch` times the exposure time, `seconds`. A straight exposure says nothing about a bow, which
+/// matters over a longer time: there the acceleration follows from the neighbours, as far as they are tracked.
+fn long_path(
+    exposure: &TimedExposure,
+    neighbours: [Option<&TimedExposure>; 2],
+    seconds: f64,
+    stretch: f64,
+) -> ExposurePath {
+    let path = ExposurePath::through(exposure);
+    if stretch == 1.0 {
+        return path;
+    }
+    let mid = exposure.mid;
+    let half_motion = motion_of(exposure).motion() * (0.5 * stretch);
+    let acceleration = match neighbours {
+        [Some(before), Some(after)] => {
+            let rate = |other: &TimedExposure| {
+                let time = other.timestamp - exposure.timestamp;
+                (mid.tangent_to(&other.mid) / time, time)
+            };
+            let ((into, since), (out, until)) = (rate(before), rate(after));
+            (out - into) * (2.0 / (until - since))
+        }
+        _ => Vector6::zeros(),
+    };
+    let half_time = 0.5 * stretch * seconds;
+    let lift = acceleration * (0.5 * half_time * half_time);
+    let [start, end] = [lift - half_motion, lift + half_motion].map(|tangent| mid.perturbed(&tangent));
+    ExposurePath::through(&TimedExposure { timestamp: exposure.timestamp, start, mid, end })
 }
 
 fn check_frames(dataset: &Dataset, run: &Run) -> Result<(), MapError> {

@@ -132,7 +132,7 @@ impl<'a> Header<'a> {
     /// Reads the header of the file `path` with the content `bytes`.
     pub(crate) fn parse(path: &Path, bytes: &'a [u8]) -> Result<Self, PlyError> {
         let mut lines = Lines { path, rest: bytes, line: 0 };
-        if !bytes.starts_with(b"ply") || lines.next()? != "ply" {
+        if !bytes.starts_with(super::MAGIC) || lines.next()? != "ply" {
             return Err(PlyError::NotPly { path: path.to_owned() });
         }
         let mut encoding = None;

@@ -4,6 +4,9 @@ mod error;
 mod header;
 mod records;
 
+/// What every PLY file starts with.
+pub(crate) const MAGIC: &[u8] = b"ply";
+
 pub use error::PlyError;
 pub(crate) use header::{Element, Header};
 pub(crate) use records::Records;

@@ -148,10 +148,11 @@ impl Outline {
 
     /// Visits every tile of the bounding box with the rows of its blocks, some or all of which may be empty.
     fn for_each_tile(&self, grid: &TileGrid, mut visit: impl FnMut(usize, [RowRange; TILE_COLUMNS])) {
-        let [columns, rows] = [0, 1].map(|i| {
+        let [columns, mut rows] = [0, 1].map(|i| {
             let (centre, radius) = (self.centre[i], self.extent.radius[i] + self.margin);
             pixel_range(centre - radius, centre + radius, [grid.width, grid.height][i])
         });
+        rows.0 = rows.0.max(grid.top());
         if columns.0 >= columns.1 || rows.0 >= rows.1 {
             return;
         }
@@ -160,7 +161,10 @@ impl Outline {
             let blocks: [(usize, usize); TILE_COLUMNS] =
                 core::array::from_fn(|block| self.rows_of_block(grid, first + block));
             for down in rows.0 / TILE_HEIGHT..rows.1.div_ceil(TILE_HEIGHT) {
-                visit(down * grid.across + across, blocks.map(|rows| rows_within(rows, down * TILE_HEIGHT)));
+                visit(
+                    (down - grid.above) * grid.across + across,
+                    blocks.map(|rows| rows_within(rows, down * TILE_HEIGHT)),
+                );
             }
         }
     }

@@ -33,11 +33,13 @@ pub struct Rasterizer {
 #[derive(Debug, Default)]
 pub struct RasterScratch {
     view: ViewNumbers,
-    background: [f32; 3],
+    /// Columns and rows of the image, of which the view may have a band only.
+    size: [usize; 2],
+    pub(super) background: [f32; 3],
     projected: Vec<Projected>,
     order: Order,
-    bins: Bins,
-    tiles: Vec<TilePixels>,
+    pub(super) bins: Bins,
+    pub(super) tiles: Vec<TilePixels>,
     sums: Vec<SplatSums>,
     pose_sums: PoseSums,
 }
@@ -48,16 +50,35 @@ pub(crate) struct PoseSums(Vec<ViewSums>);
 
 /// How the gradient by an image is that by one of the views that it shows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ViewShare {
+pub(crate) struct ViewShare<'a> {
     /// Weight of the view in the colour of the image.
-    pub(crate) colour: f32,
+    pub(crate) colour: ColourShare<'a>,
     /// Whether depth and alpha of the image are those of the view; else they do not depend on it.
     pub(crate) geometry: bool,
 }
 
-impl ViewShare {
+/// Weight of a view in the colour of an image.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ColourShare<'a> {
+    /// The same for all rows.
+    Same(f32),
+    /// One for every row of the image.
+    Rows(&'a [f32]),
+}
+
+impl ColourShare<'_> {
+    /// The weight in a row of the image.
+    pub(super) fn of_row(self, row: usize) -> f32 {
+        match self {
+            Self::Same(weight) => weight,
+            Self::Rows(weights) => weights[row],
+        }
+    }
+}
+
+impl ViewShare<'_> {
     /// The image is the view.
-    const WHOLE: Self = Self { colour: 1.0, geometry: true };
+    const WHOLE: Self = Self { colour: ColourShare::Same(1.0), geometry: true };
 }
 
 /// Gradients of a loss by Gaussians, summed over views.
@@ -106,8 +127,7 @@ impl RasterScratch {
         image: &RasterImage,
         gradients: &GaussianGradients,
     ) -> bool {
-        let grid = self.bins.grid;
-        let same_image = (image.width, image.height) == (grid.width, grid.height);
+        let same_image = [image.width, image.height] == self.size;
         same_image && gaussians.len() == self.projected.len() && gradients.screen.len() == gaussians.len()
     }
 
@@ -158,9 +178,34 @@ impl Rasterizer {
         geometry: bool,
         scratch: &mut RasterScratch,
     ) {
-        self.project(gaussians, view, scratch);
+        let grid = TileGrid::new(view.camera.width, view.camera.height);
+        self.render_grid(gaussians, view, &grid, geometry, scratch);
+    }
+
+    /// [`Self::render`] for the rows of tiles in `band` only.
+    pub(crate) fn render_band(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        band: &Range<usize>,
+        geometry: bool,
+        scratch: &mut RasterScratch,
+    ) {
+        let grid = TileGrid::new(view.camera.width, view.camera.height).band(band);
+        self.render_grid(gaussians, view, &grid, geometry, scratch);
+    }
+
+    fn render_grid(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        grid: &TileGrid,
+        geometry: bool,
+        scratch: &mut RasterScratch,
+    ) {
+        self.project_grid(gaussians, view, grid, scratch);
         self.order(scratch);
-        self.bin(view, scratch);
+        self.bin_grid(grid, scratch);
         if geometry {
             self.composite_tiles::<true>(scratch);
         } else {
@@ -207,7 +252,19 @@ impl Rasterizer {
 
     /// First stage of [`Self::forward`]: projects every Gaussian.
     pub fn project(&self, gaussians: &Gaussians, view: &RasterView, scratch: &mut RasterScratch) {
-        scratch.view = ViewNumbers::new(view);
+        let grid = TileGrid::new(view.camera.width, view.camera.height);
+        self.project_grid(gaussians, view, &grid, scratch);
+    }
+
+    fn project_grid(
+        &self,
+        gaussians: &Gaussians,
+        view: &RasterView,
+        grid: &TileGrid,
+        scratch: &mut RasterScratch,
+    ) {
+        scratch.view = ViewNumbers::new(view).within(grid);
+        scratch.size = [view.camera.width, view.camera.height];
         scratch.background = view.background.map(|channel| channel as f32);
         scratch.projected.resize(gaussians.len(), Projected::default());
         let planes = slices(gaussians);
@@ -226,11 +283,14 @@ impl Rasterizer {
 
     /// Third stage of [`Self::forward`]: lists the splats of every tile.
     pub fn bin(&self, view: &RasterView, scratch: &mut RasterScratch) {
+        self.bin_grid(&TileGrid::new(view.camera.width, view.camera.height), scratch);
+    }
+
+    fn bin_grid(&self, grid: &TileGrid, scratch: &mut RasterScratch) {
         let RasterScratch { bins, order, .. } = scratch;
-        let grid = TileGrid::new(view.camera.width, view.camera.height);
-        bins.reset(grid, order.len());
+        bins.reset(*grid, order.len());
         let chunks = bins.chunks_mut().par_iter_mut().enumerate();
-        chunks.for_each(|(chunk, entries)| entries.fill(&grid, order, chunk));
+        chunks.for_each(|(chunk, entries)| entries.fill(grid, order, chunk));
         bins.gather();
     }
 
@@ -268,7 +328,12 @@ impl Rasterizer {
     }
 
     /// [`Self::replay`] for an image of which the view has a share.
-    pub(crate) fn replay_share(&self, by_image: &RasterImage, share: ViewShare, scratch: &mut RasterScratch) {
+    pub(crate) fn replay_share(
+        &self,
+        by_image: &RasterImage,
+        share: ViewShare<'_>,
+        scratch: &mut RasterScratch,
+    ) {
         let mut sums = core::mem::take(&mut scratch.sums);
         sums.resize(scratch.bins.entries.len(), [0.0; 12]);
         let input = Replay { by_image, share, scratch };
@@ -355,7 +420,7 @@ impl Rasterizer {
 /// What replaying a view needs.
 struct Replay<'a> {
     by_image: &'a RasterImage,
-    share: ViewShare,
+    share: ViewShare<'a>,
     scratch: &'a RasterScratch,
 }
 

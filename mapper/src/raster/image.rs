@@ -148,10 +148,51 @@ fn mean_colour<'a>(
     sums.map(|channel| channel.map(|sum| sum * share))
 }
 
+/// What a view gives to a row of tiles of an image.
+pub(super) struct RowPart<'a> {
+    /// The tiles of the row.
+    pub(super) tiles: &'a [TilePixels],
+    pub(super) background: &'a [f32; 3],
+    /// Weight of its colours in every row of pixels.
+    pub(super) weights: [f32; TILE_HEIGHT],
+    /// Whether depth and alpha are those of this view.
+    pub(super) geometry: bool,
+}
+
+/// Stores the weighted sum of the colours of views in a row of tiles, with depth and alpha of the one that has them.
+pub(super) fn store_weighted(parts: &[RowPart<'_>], grid: &TileGrid, rows: &mut TileRows) {
+    rows.store(grid, |across, block, cell| {
+        let mut planes = [[0.0; CELL]; 5];
+        for RowPart { tiles, background, weights, geometry } in parts {
+            let pixels = &tiles[across].blocks[block][cell];
+            for row in 0..CELL_HEIGHT {
+                let weight = weights[cell * CELL_HEIGHT + row];
+                if weight == 0.0 {
+                    continue;
+                }
+                let in_row = row * BLOCK_WIDTH..(row + 1) * BLOCK_WIDTH;
+                let behind = &pixels.transmittance[in_row.clone()];
+                for (channel, background) in background.iter().enumerate() {
+                    let colours = pixels.colour[channel][in_row.clone()].iter().zip(behind);
+                    let sums = planes[channel][in_row.clone()].iter_mut();
+                    sums.zip(colours).for_each(|(sum, (colour, behind))| {
+                        *sum += weight * (colour + behind.abs() * background);
+                    });
+                }
+            }
+            if *geometry {
+                planes[3] = pixels.depth;
+                planes[4] = pixels.transmittance.map(|left| 1.0 - left.abs());
+            }
+        }
+        planes
+    });
+}
+
 /// The gradient by the pixels of a tile of a view with a share in the image; zero beyond the image.
 pub(super) fn load_gradient(
     image: &RasterImage,
-    share: ViewShare,
+    share: ViewShare<'_>,
     grid: &TileGrid,
     tile: usize,
     out: &mut TileGradient,
@@ -169,10 +210,11 @@ pub(super) fn load_gradient(
         }
         for y in 0..TILE_HEIGHT.min(grid.height - top) {
             let from = (top + y) * grid.width + left..(top + y + 1) * grid.width;
+            let colour = share.colour.of_row(top + y);
             let at = y % CELL_HEIGHT * BLOCK_WIDTH;
             let rows = cells[y / CELL_HEIGHT].given_mut().map(|values| &mut values[at..at + BLOCK_WIDTH]);
             for (k, (row, plane)) in rows.into_iter().zip(image.planes()).take(planes).enumerate() {
-                let weight = if k < 3 { share.colour } else { 1.0 };
+                let weight = if k < 3 { colour } else { 1.0 };
                 load_columns(weight, &plane[from.clone()], row);
             }
         }

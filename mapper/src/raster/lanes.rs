@@ -6,6 +6,7 @@ use fearless_simd::{f32x8, mask32x8, prelude::*};
 
 use super::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, MIN_ALPHA, NEAR_PLANE};
 use super::exp::exp;
+use super::tile::TileGrid;
 use super::view::RasterView;
 use crate::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, PARAMETERS, ROTATION};
 
@@ -25,7 +26,8 @@ pub(super) struct ViewNumbers {
     pub(super) centre: [f32; 2],
     /// Limits of `x/z` and `y/z` in the Jacobian.
     pub(super) limits: [[f32; 2]; 2],
-    /// Last column and row of pixel centres.
+    /// First and last column and row of pixel centres that are drawn.
+    pub(super) first: [f32; 2],
     pub(super) last: [f32; 2],
 }
 
@@ -40,8 +42,15 @@ impl ViewNumbers {
             focal: [camera.fx as f32, camera.fy as f32],
             centre: [camera.cx as f32, camera.cy as f32],
             limits: view.jacobian_limits().map(|limits| limits.map(|limit| limit as f32)),
+            first: [0.0; 2],
             last: [camera.width as f32 - 1.0, camera.height as f32 - 1.0],
         }
+    }
+
+    /// The same for the rows of a grid only.
+    pub(super) fn within(self, grid: &TileGrid) -> Self {
+        let [[left, _], [right, _]] = [self.first, self.last];
+        Self { first: [left, grid.top() as f32], last: [right, grid.height as f32 - 1.0], ..self }
     }
 }
 

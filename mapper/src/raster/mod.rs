@@ -9,6 +9,7 @@
 //! depend on their number. [`mod@reference`] is the slow oracle.
 
 mod backward;
+mod bands;
 mod bin;
 pub mod constants;
 mod driver;
@@ -26,7 +27,9 @@ pub mod reference;
 mod tile;
 mod view;
 
+pub(crate) use bands::BandView;
+pub(crate) use driver::{ColourShare, PoseSums, ViewShare};
 pub use driver::{GaussianGradients, RasterScratch, Rasterizer};
-pub(crate) use driver::{PoseSums, ViewShare};
 pub use image::RasterImage;
+pub(crate) use tile::TILE_HEIGHT;
 pub use view::RasterView;

@@ -146,7 +146,7 @@ fn overlaps_image<S: Simd>(view: &ViewNumbers, lanes: &Lanes<S>, extent: &[f32x8
         #[inline(always)]
         |i| {
             let (low, high) = (lanes.centre[i] - extent[i], lanes.centre[i] + extent[i]);
-            high.simd_ge(0.0) & low.simd_le(view.last[i])
+            high.simd_ge(view.first[i]) & low.simd_le(view.last[i])
         },
     );
     along[0] & along[1]

@@ -1,6 +1,7 @@
 //! One view: colours as the camera would have stored them, and depth.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
@@ -26,6 +27,7 @@ pub struct ViewRenderer<'a> {
     camera: PinholeCamera,
     depth_scale: f32,
     response: ForwardResponse,
+    falloff: Option<Arc<[f32]>>,
     inverse: InverseResponse,
     renderer: SceneRenderer,
 }
@@ -74,8 +76,16 @@ impl<'a> ViewRenderer<'a> {
             depth_scale: depth_scale as f32,
             response: ForwardResponse::new(response),
             inverse: response.clone(),
+            falloff: None,
             renderer: SceneRenderer::new(SimdLevel::new()),
         }
+    }
+
+    /// The same through a lens that lets this share of light through to each pixel, row by row; none for all of it
+    /// everywhere.
+    #[must_use]
+    pub fn through(self, falloff: Option<Arc<[f32]>>) -> Self {
+        Self { falloff, ..self }
     }
 
     /// The view from a pose. It does not depend on the number of threads.
@@ -84,9 +94,16 @@ impl<'a> ViewRenderer<'a> {
         self.renderer.render(self.map, self.camera, world_from_camera);
         let image = &mut self.renderer.image;
         match behind {
-            Behind::Black => (),
-            Behind::Surroundings => fill_holes(image),
-            Behind::Captured { colour, gain } => put_in_front(image, &self.inverse, colour, gain),
+            Behind::Black => dim(image, self.falloff.as_deref()),
+            Behind::Surroundings => {
+                fill_holes(image);
+                dim(image, self.falloff.as_deref());
+            }
+            Behind::Captured { colour, gain } => {
+                // A captured image is dimmed already.
+                dim(image, self.falloff.as_deref());
+                put_in_front(image, &self.inverse, colour, gain);
+            }
         }
         let RasterImage { width, height, colour: [red, green, blue], depth, alpha } = &self.renderer.image;
         let colours = red.iter().zip(green).zip(blue).map(|((red, green), blue)| [*red, *green, *blue]);
@@ -109,6 +126,14 @@ impl<'a> ViewRenderer<'a> {
 /// How much of what is behind is seen. A map is fitted in front of black, so its light is whole wherever it is solid.
 fn share_behind(alpha: f32) -> f32 {
     (1.0 - alpha / SOLID_ALPHA).max(0.0)
+}
+
+/// Takes the light that the lens keeps away.
+fn dim(image: &mut RasterImage, falloff: Option<&[f32]>) {
+    let Some(falloff) = falloff else { return };
+    for plane in &mut image.colour {
+        plane.iter_mut().zip(falloff).for_each(|(light, share)| *light *= share);
+    }
 }
 
 /// Multiplies the light by `gain` and puts it in front of a captured image; nothing happens for one of another size.

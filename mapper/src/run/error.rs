@@ -4,6 +4,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::FileError;
+use crate::output::OutputError;
 
 /// A RUN folder cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -49,6 +50,9 @@ pub enum RunError {
         /// What is wrong, with line and column.
         message: String,
     },
+    /// The folder must not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// A trajectory, or any file that cannot be read.
     #[error(transparent)]
     File(#[from] FileError),

@@ -43,10 +43,58 @@ pub struct FrameRecord {
     pub inliers: f64,
     /// Brightness factor against the keyframe.
     pub gain: f64,
+    /// Why the frame is weak or lost; none for one that is ok, and in runs of versions that did not say it.
+    #[serde(default)]
+    pub reason: Option<Reason>,
+}
+
+/// Why a frame is weak or lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reason {
+    /// The image shows nothing: it is black, saturated or covered.
+    Blind,
+    /// Nothing to start from: too little depth, depth out of any sensor's range, or no texture.
+    #[serde(rename = "no start")]
+    NoStart,
+    /// Nothing of the reference was found.
+    #[serde(rename = "no match")]
+    NoMatch,
+    /// The camera would have moved faster than any hand.
+    Speed,
+    /// The brightness would have changed more than any exposure control changes it.
+    Brightness,
+    /// Few of the reference's patches are in view and agree.
+    Inliers,
+    /// Picture and depth fit much worse than usual.
+    Residual,
+    /// Found again near an earlier keyframe; the motion is not known yet.
+    #[serde(rename = "found again")]
+    FoundAgain,
+    /// The frame could not be read or used.
+    Skipped,
+}
+
+impl Reason {
+    /// The reason as in the table.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Blind => "blind",
+            Self::NoStart => "no start",
+            Self::NoMatch => "no match",
+            Self::Speed => "speed",
+            Self::Brightness => "brightness",
+            Self::Inliers => "inliers",
+            Self::Residual => "residual",
+            Self::FoundAgain => "found again",
+            Self::Skipped => "skipped",
+        }
+    }
 }
 
 /// The header of the table.
-const COLUMNS: [&str; 10] = [
+const COLUMNS: [&str; 11] = [
     "timestamp",
     "status",
     "keyframe",
@@ -57,6 +105,7 @@ const COLUMNS: [&str; 10] = [
     "residual",
     "inliers",
     "gain",
+    "reason",
 ];
 
 /// The table as text.
@@ -70,7 +119,7 @@ pub(super) fn format_frames(frames: &[FrameRecord]) -> String {
             FrameStatus::Lost => "lost",
         };
         text.push_str(&format!(
-            "{:.6},{status},{},{:.3},{:.3},{},{},{:.6},{:.4},{:.4}\n",
+            "{:.6},{status},{},{:.3},{:.3},{},{},{:.6},{:.4},{:.4},{}\n",
             f.timestamp,
             f.keyframe,
             f.ms,
@@ -79,7 +128,8 @@ pub(super) fn format_frames(frames: &[FrameRecord]) -> String {
             f.iterations,
             f.residual,
             f.inliers,
-            f.gain
+            f.gain,
+            f.reason.map_or("", Reason::name)
         ));
     }
     text

@@ -19,16 +19,19 @@ mod keyframe_images;
 mod map;
 mod merit;
 mod reader;
+mod rows;
 mod summary;
 mod writer;
 
 pub use camera::{RunCamera, RunResponse};
 pub use error::RunError;
-pub use frame_record::{FrameRecord, FrameStatus};
+pub use frame_record::{FrameRecord, FrameStatus, Reason};
 pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
 pub use map::{MapFileError, StoredMap};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
+pub(crate) use reader::is_run;
+pub(crate) use rows::RunRows;
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 

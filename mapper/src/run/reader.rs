@@ -45,6 +45,16 @@ impl Run {
     }
 }
 
+/// Whether a command wrote `folder`: its summary has the form of one, whatever the version.
+pub(crate) fn is_run(folder: &Path) -> bool {
+    let text = read_text(&folder.join(SUMMARY_FILE)).unwrap_or_default();
+    let summary: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    summary["format"].is_u64()
+        && summary["complete"].is_boolean()
+        && summary["program"].is_string()
+        && summary["frames"].is_object()
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
@@ -66,7 +76,7 @@ mod tests {
         let (program, dataset) = (String::new(), String::new());
         let settings =
             RunSettings { program, dataset, frame_rate: 30.0, camera, options: Default::default() };
-        RunWriter::create(folder.path(), settings).unwrap();
+        RunWriter::create_in(folder.path(), settings).unwrap();
         let message = Run::open(folder.path()).unwrap_err().to_string();
         assert!(message.contains("summary.json: camera: fx is 0, expected a focal length"), "{message}");
     }

@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mba_tracker::geometry::RigidTransform;
 
@@ -13,6 +13,7 @@ use super::{
 };
 use super::{FrameRecord, FrameStatus, RunError, RunSettings, StoredMap, Summary, frame_record};
 use crate::gaussians::write_ply;
+use crate::output::{OutputFolder, Permission};
 use crate::rendering::Scene;
 use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use crate::triplane::write_field;
@@ -21,33 +22,37 @@ use crate::whole_file::write_together;
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
 const FRAMES_PER_FLUSH: usize = 50;
 
+/// Tracked frames after which a run replaces an earlier one in its folder: the first frame of any input is tracked.
+const FRAMES_THAT_PROVE: usize = 2;
+
 /// Collects the results of a run and keeps its folder up to date.
 ///
-/// When it is dropped before [`Self::finish`], e.g. because of an error, what was pushed is still written, marked as
-/// incomplete.
+/// An earlier run in the folder stays until this one has found two frames or is finished. When this is
+/// dropped before [`Self::finish`], e.g. because of an error, what was pushed is still written, marked as incomplete.
 #[derive(Debug)]
 pub struct RunWriter {
-    folder: PathBuf,
+    folder: OutputFolder,
+    /// Whether the files in the folder are those of this run.
+    is_started: bool,
     settings: RunSettings,
-    exposures: Vec<TimedExposure>,
-    frames: Vec<FrameRecord>,
-    skipped: usize,
+    pub(super) exposures: Vec<TimedExposure>,
+    pub(super) frames: Vec<FrameRecord>,
+    pub(super) skipped: usize,
     deblurred: usize,
-    warnings: Vec<String>,
+    pub(super) warnings: Vec<String>,
     unwritten: usize,
 }
 
 impl RunWriter {
-    /// Creates the folder with the files of a run without frames, replacing those of an earlier run. So an output
-    /// that cannot be written is noticed before any work is done.
+    /// Writes the files of a run without frames, unless there is an earlier run.
     ///
     /// # Errors
     /// [`RunError::Unwritable`] or [`RunError::DiskFull`].
-    pub fn create(folder: &Path, settings: RunSettings) -> Result<Self, RunError> {
-        fs::create_dir_all(folder).map_err(|reason| RunError::unwritable(folder, reason))?;
-        remove_keyframe_images(folder)?;
+    pub fn create(folder: OutputFolder, settings: RunSettings) -> Result<Self, RunError> {
+        let has_earlier = folder.has_earlier();
         let mut writer = Self {
-            folder: folder.to_owned(),
+            folder,
+            is_started: false,
             settings,
             exposures: Vec::new(),
             frames: Vec::new(),
@@ -56,8 +61,36 @@ impl RunWriter {
             warnings: Vec::new(),
             unwritten: 0,
         };
-        writer.flush()?;
+        if !has_earlier {
+            writer.start()?;
+        }
         Ok(writer)
+    }
+
+    /// Creates the writer of a run in `folder`, which no command reads.
+    ///
+    /// # Errors
+    /// As [`OutputFolder::for_run`] and [`Self::create`].
+    pub fn create_in(folder: &Path, settings: RunSettings) -> Result<Self, RunError> {
+        Self::create(OutputFolder::for_run(folder, &Permission::default())?, settings)
+    }
+
+    /// Puts the files of this run in the place of an earlier one. They are on the disk before anything is removed.
+    fn start(&mut self) -> Result<(), RunError> {
+        self.write(&self.summary())?;
+        self.is_started = true;
+        self.unwritten = 0;
+        if !self.folder.has_earlier() {
+            return Ok(());
+        }
+        remove_keyframe_images(self.folder())?;
+        [MAP_FILE, FIELD_FILE].iter().try_for_each(|name| remove(&self.folder().join(name)))
+    }
+
+    /// Whether enough frames were found to take the place of an earlier run.
+    fn is_proven(&self) -> bool {
+        let tracked = self.frames.iter().filter(|frame| frame.status != FrameStatus::Lost);
+        tracked.take(FRAMES_THAT_PROVE).count() == FRAMES_THAT_PROVE
     }
 
     /// Adds one tracked frame; frames come in order of time.
@@ -153,30 +186,27 @@ impl RunWriter {
     pub fn write_map<'a>(&self, map: impl Into<Scene<'a>>) -> Result<(), RunError> {
         let other = match map.into() {
             Scene::Gaussians(map) => {
-                write_ply(&self.folder.join(MAP_FILE), map).map_err(RunError::from_write)?;
+                write_ply(&self.folder().join(MAP_FILE), map).map_err(RunError::from_write)?;
                 FIELD_FILE
             }
             Scene::Field(map) => {
-                write_field(&self.folder.join(FIELD_FILE), map).map_err(RunError::from_write)?;
+                write_field(&self.folder().join(FIELD_FILE), map).map_err(RunError::from_write)?;
                 MAP_FILE
             }
         };
-        remove(&self.folder.join(other))
+        remove(&self.folder().join(other))
     }
 
     /// Bytes of the file of the map; 0 without one.
     #[must_use]
     pub fn map_bytes(&self) -> u64 {
-        let path = StoredMap::path(&self.folder);
+        let path = StoredMap::path(self.folder());
         path.and_then(|path| fs::metadata(path).ok()).map_or(0, |file| file.len())
     }
 
-    /// Removes the checkpoint of the finished run in `folder`, also one that a kill left half written.
-    ///
-    /// # Errors
-    /// [`RunError::Unwritable`].
-    pub fn remove_checkpoint(folder: &Path) -> Result<(), RunError> {
-        let path = folder.join(CHECKPOINT_FILE);
+    /// Removes the checkpoint, also one that a kill left half written.
+    fn remove_checkpoint(&self) -> Result<(), RunError> {
+        let path = self.folder().join(CHECKPOINT_FILE);
         let half_written = path.with_added_extension("partial");
         [path, half_written].iter().try_for_each(|path| remove(path))
     }
@@ -189,28 +219,53 @@ impl RunWriter {
     /// The folder of the run.
     #[must_use]
     pub fn folder(&self) -> &Path {
-        &self.folder
+        self.folder.path()
     }
 
-    /// Brings all files up to date, marked as incomplete.
+    /// Brings all files up to date, marked as incomplete; those of an earlier run stay until enough frames were found.
     ///
     /// # Errors
     /// As [`Self::create`].
     pub fn flush(&mut self) -> Result<(), RunError> {
+        if !self.is_started {
+            return if self.is_proven() { self.start() } else { Ok(()) };
+        }
         // Even after an error the next attempt waits for more frames: a full disk is not filled at every frame.
         self.unwritten = 0;
         self.write(&self.summary())
     }
 
-    /// Writes the finished run; `figures` completes the summary with figures of merit.
+    /// Takes the place of an earlier run if that has not happened yet, so that images and maps can be written.
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn replace_earlier(&mut self) -> Result<(), RunError> {
+        if self.is_started { Ok(()) } else { self.start() }
+    }
+
+    /// Whether an earlier run still lies in the folder.
+    #[must_use]
+    pub fn has_earlier(&self) -> bool {
+        !self.is_started
+    }
+
+    /// Leaves the folder to the earlier run in it.
+    pub fn give_up(mut self) {
+        self.unwritten = 0;
+    }
+
+    /// Writes the finished run; `figures` completes the summary with figures of merit. What a stopped run would have
+    /// gone on from is removed.
     ///
     /// # Errors
     /// As [`Self::create`].
     pub fn finish(mut self, figures: impl FnOnce(&mut Summary)) -> Result<Summary, RunError> {
+        self.replace_earlier()?;
         let mut summary = Summary { complete: true, ..self.summary() };
         figures(&mut summary);
         self.unwritten = 0;
         self.write(&summary)?;
+        self.remove_checkpoint()?;
         Ok(summary)
     }
 
@@ -222,9 +277,9 @@ impl RunWriter {
     fn write(&self, summary: &Summary) -> Result<(), RunError> {
         let poses: Vec<TimedPose> = self.exposures.iter().map(mid_pose).collect();
         let json = serde_json::to_string_pretty(summary).map_err(|error| {
-            RunError::unwritable(&self.folder.join(SUMMARY_FILE), io::Error::other(error))
+            RunError::unwritable(&self.folder().join(SUMMARY_FILE), io::Error::other(error))
         })?;
-        let file = |name: &str, text: String| (self.folder.join(name), text);
+        let file = |name: &str, text: String| (self.folder().join(name), text);
         write_together(&[
             file(TRAJECTORY_FILE, format_trajectory(&poses)),
             file(EXPOSURES_FILE, format_exposures(&self.exposures)),
@@ -281,6 +336,7 @@ mod tests {
             residual: if lost { f64::NAN } else { 0.015625 },
             inliers: 0.75,
             gain: 1.0,
+            reason: None,
         };
         (exposure, record)
     }
@@ -293,7 +349,7 @@ mod tests {
     #[test]
     fn a_finished_run_reads_back() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        let mut writer = RunWriter::create_in(folder.path(), settings()).unwrap();
         push(&mut writer, 0, FrameStatus::Ok);
         push(&mut writer, 1, FrameStatus::Weak);
         let (exposure, record) = frame(2, FrameStatus::Lost);
@@ -313,14 +369,14 @@ mod tests {
         assert!(run.frames[2].residual.is_nan());
         let header = fs::read_to_string(folder.path().join("frames.csv")).unwrap();
         assert!(header.starts_with(
-            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain\n"
+            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain,reason\n"
         ));
     }
 
     #[test]
     fn a_revised_frame_replaces_the_first_estimate() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        let mut writer = RunWriter::create_in(folder.path(), settings()).unwrap();
         push(&mut writer, 0, FrameStatus::Ok);
         push(&mut writer, 1, FrameStatus::Ok);
         let better = TimedExposure { timestamp: 0.0, ..frame(7, FrameStatus::Ok).0 };
@@ -335,7 +391,7 @@ mod tests {
     #[test]
     fn an_abandoned_run_keeps_its_frames() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        let mut writer = RunWriter::create_in(folder.path(), settings()).unwrap();
         for k in 0..FRAMES_PER_FLUSH {
             push(&mut writer, k, FrameStatus::Ok);
         }
@@ -356,7 +412,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         fs::write(&file, "x").unwrap();
-        let error = RunWriter::create(&file.join("run"), settings()).unwrap_err();
+        let error = RunWriter::create_in(&file.join("run"), settings()).unwrap_err();
         assert!(error.to_string().contains("file/run"), "{error}");
     }
 
@@ -364,7 +420,7 @@ mod tests {
     #[test]
     fn a_full_disk_leaves_the_last_good_version() {
         let folder = tempfile::tempdir().unwrap();
-        let mut writer = RunWriter::create(folder.path(), settings()).unwrap();
+        let mut writer = RunWriter::create_in(folder.path(), settings()).unwrap();
         push(&mut writer, 0, FrameStatus::Ok);
         writer.flush().unwrap();
         // Everything written to /dev/full fails for lack of space.

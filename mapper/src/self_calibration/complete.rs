@@ -208,6 +208,12 @@ fn follow_brightness(tracked: &[Tracked], guess: &Guess) -> Vec<f64> {
     search::by_brightness(tracked, count, mean.exp())
 }
 
+/// Exposure times whose ratios are a power of those given; their mean (of logarithms) stays.
+fn raised(exposures: &[f64], power: f64) -> Vec<f64> {
+    let mean = exposures.iter().map(|seconds| seconds.ln()).sum::<f64>() / exposures.len() as f64;
+    exposures.iter().map(|seconds| (mean + power * (seconds.ln() - mean)).exp()).collect()
+}
+
 /// Exposure times of all frames, seconds, and their common relative standard deviation.
 fn find_exposures(search: &Search<'_>, mut guess: Guess, whole: bool) -> Option<(Vec<f64>, f64)> {
     let start = search.probe(vec![guess.clone()]).pop()?;
@@ -215,13 +221,23 @@ fn find_exposures(search: &Search<'_>, mut guess: Guess, whole: bool) -> Option<
         guess.exposures = follow_brightness(&start.tracked, &guess);
     }
     let start = search.probe(vec![guess]).pop()?;
-    let (settled, _) = search.settle_exposure(start)?;
+    let (mut settled, _) = search.settle_exposure(start)?;
+    let interval = 1.0 / search.dataset.calibration().frame_rate;
+    let mut power = 1.0;
+    if whole && search.dataset.calibration().sources.response == Knowledge::Assumed {
+        let observed = exposure::observations(&settled.tracked, &search.scale, interval);
+        if let Some(found) = exposure::power(&observed, &settled.guess.exposures) {
+            power = found;
+            let exposures = raised(&settled.guess.exposures, power);
+            let start = search.probe(vec![Guess { exposures, ..settled.guess }]).pop()?;
+            (settled, _) = search.settle_exposure(start)?;
+        }
+    }
     let Probe { guess, mut tracked, .. } = settled;
     if !whole {
         tracked = everything(search.dataset, search.options, &guess);
     }
-    let exposures = follow_brightness(&tracked, &guess);
-    let interval = 1.0 / search.dataset.calibration().frame_rate;
+    let exposures = raised(&follow_brightness(&tracked, &guess), power);
     let observed = exposure::observations(&tracked, &search.scale, interval);
     let by_brightness = exposure::factor(&observed, &exposures)?;
     let constant = vec![1.0; exposures.len()];

@@ -3,7 +3,7 @@
 use mba_tracker::geometry::PinholeCamera;
 use nalgebra::Vector6;
 
-use super::robust::{Spread, spread};
+use super::robust::{Spread, median, spread};
 use super::window::Tracked;
 
 /// Longest gap between neighbours whose poses tell a velocity, seconds: three frames of a video.
@@ -15,6 +15,15 @@ const MIN_MOTION_PX: f64 = 3.0;
 
 /// Fewest frames with enough motion.
 const MIN_FRAMES: usize = 5;
+
+/// Two exposure times tell a power when their logarithms are this far apart, and half of the frames when this many pairs
+/// of them do.
+const MIN_LOG_STEP: f64 = 0.1;
+const MIN_SLOPES: usize = 20;
+
+/// Powers between an assumed and a usual response, and how far two halves of the frames may differ.
+const POWERS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+const MAX_CONTRADICTION: f64 = 0.5;
 
 /// Turns motions (translation in metres, rotation in radians) into pixels at a typical depth.
 #[derive(Clone, Copy, Debug)]
@@ -89,6 +98,29 @@ pub(super) fn factor(observations: &[(usize, f64, f64)], exposures: &[f64]) -> O
     spread(&ratios)
 }
 
+/// The power of `exposures` that the motion follows, where their ratios come from brightness through an assumed response.
+/// A response is known up to a power as long as no exposure times are; motion tells them.
+///
+/// The median of the slopes between all pairs of frames on logarithmic axes, after Theil and Sen. None where exposures
+/// hardly vary, or where one half of the frames contradicts the other.
+pub(super) fn power(observations: &[(usize, f64, f64)], exposures: &[f64]) -> Option<f64> {
+    let point = |(index, seconds, _): &(usize, f64, f64)| (exposures[*index].ln(), seconds.max(1e-4).ln());
+    let points: Vec<(f64, f64)> = observations.iter().map(point).collect();
+    let slope = |points: &[(f64, f64)]| {
+        let pairs = points.iter().enumerate().flat_map(|(k, a)| points[..k].iter().map(move |b| (a, b)));
+        let slopes: Vec<f64> = pairs
+            .filter(|(a, b)| (a.0 - b.0).abs() > MIN_LOG_STEP)
+            .map(|(a, b)| (a.1 - b.1) / (a.0 - b.0))
+            .collect();
+        if slopes.len() < MIN_SLOPES { None } else { median(&slopes) }
+    };
+    let half = |which: usize| points.iter().skip(which).step_by(2).copied().collect::<Vec<_>>();
+    let (even, odd) = (slope(&half(0))?, slope(&half(1))?);
+    let found = slope(&points)?;
+    let is_certain = POWERS.contains(&found) && (even - odd).abs() < MAX_CONTRADICTION;
+    is_certain.then_some(found)
+}
+
 #[cfg(test)]
 mod tests {
     use mba_tracker::geometry::RigidTransform;
@@ -151,5 +183,17 @@ mod tests {
         let observations = observations(&still, &SCALE, INTERVAL);
         assert_eq!(observations.len(), 0);
         assert!(factor(&observations, &[0.01; 20]).is_none());
+    }
+
+    #[test]
+    fn motion_tells_the_power_of_a_response() {
+        // Brightness through a wrong response: true times are the 1.4th power of what it says.
+        let exposures: Vec<f64> = (0..30).map(|k| 0.006 * 1.03_f64.powi(k)).collect();
+        let seconds = |k: usize| 3.0 * exposures[k].powf(1.4) * if k % 7 == 3 { 0.3 } else { 1.0 };
+        let observations: Vec<(usize, f64, f64)> = (0..30).map(|k| (k, seconds(k), 10.0)).collect();
+        let found = power(&observations, &exposures).unwrap();
+        assert!((found - 1.4).abs() < 1e-6, "{found}");
+        assert_eq!(power(&observations, &[0.01; 30]), None, "all alike");
+        assert_eq!(power(&observations[..6], &exposures), None, "too few");
     }
 }

@@ -1,15 +1,20 @@
 //! The mapper's side of the loop.
 
+use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::RigidTransform;
 
+use super::SlamError;
 use super::driver::SlamProgress;
-use super::growing_map::GrowingMap;
+use super::growing_map::{GrowingMap, LEVELS};
 use super::loops::Loops;
 use super::messages::{Instruction, MapperLink, SharpView, Skipped, TrackedFrame};
+use super::saved::{Counts, Keeper, MapperParts, Replay, SavedKeyframe};
 use super::settings::{Arrival, SlamReference, SlamSettings};
+use crate::bundle::{BundleState, Keyframe, ObservationPyramid, PathPrior, Sensor};
+use crate::checkpoint::exact_poses::{numbers, pose};
 use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
@@ -38,6 +43,8 @@ pub(super) struct BackEnd {
     on_map: bool,
     /// Frames since that was decided.
     undisputed: usize,
+    /// For checkpoints, in lock step.
+    keeper: Option<Keeper>,
 }
 
 impl BackEnd {
@@ -45,7 +52,7 @@ impl BackEnd {
         dataset: &Dataset,
         config: &TrackerConfig,
         settings: &SlamSettings,
-        writer: RunWriter,
+        (writer, keeper): (RunWriter, Option<Keeper>),
     ) -> Self {
         Self {
             map: GrowingMap::new(sensor(dataset), settings),
@@ -56,15 +63,68 @@ impl BackEnd {
             figures: SlamFigures::default(),
             on_map: false,
             undisputed: 0,
+            keeper,
         }
     }
 
-    /// Works until the tracker has no more frames.
+    /// Takes over what a run that was stopped knew; returns what its tracker has to go through again.
+    pub(super) fn restore(
+        &mut self,
+        dataset: &Dataset,
+        parts: MapperParts,
+        state: BundleState,
+    ) -> Result<Replay, SlamError> {
+        let images = keyframe_images(dataset, &parts.keyframes)?;
+        let keyframes = keyframes(&self.map.sensor, &parts.keyframes, &images)?;
+        let sensor = self.map.sensor.clone();
+        let grown = (parts.max_gaussians, parts.growth);
+        self.map = GrowingMap::restored(sensor, &self.settings, (keyframes, state), grown);
+        self.loops.restore(&parts.loops, &images, &self.map.sensor.camera);
+        self.moves = parts.moves.into_iter().map(pose).collect();
+        let Counts { frames_on_map, late_frames, relocalisations } = parts.counts;
+        self.figures = SlamFigures { frames_on_map, late_frames, relocalisations, ..self.figures };
+        (self.on_map, self.undisputed) = (parts.on_map, parts.undisputed);
+        if let Some(keeper) = &mut self.keeper {
+            keeper.go_on(parts.seconds, parts.instructions.clone());
+        }
+        let replay = Replay::new(parts.rows.len(), parts.instructions);
+        self.writer.restore(parts.rows)?;
+        Ok(replay)
+    }
+
+    /// Writes a checkpoint; nothing happens where there are none.
+    fn save(&mut self) -> Result<(), SlamError> {
+        let Some(mut keeper) = self.keeper.take() else { return Ok(()) };
+        let parts = |instructions, seconds| MapperParts {
+            rows: self.writer.rows(),
+            keyframes: self.map.saved_keyframes(),
+            max_gaussians: self.map.bundle.max_gaussians(),
+            growth: self.map.growth(),
+            loops: self.loops.saved(),
+            moves: self.moves.iter().map(numbers).collect(),
+            counts: self.counts(),
+            on_map: self.on_map,
+            undisputed: self.undisputed,
+            instructions,
+            seconds,
+        };
+        let saved = keeper.save_growing(parts, &self.map.bundle.state);
+        self.keeper = Some(keeper);
+        Ok(saved?)
+    }
+
+    /// What was counted so far.
+    fn counts(&self) -> Counts {
+        let SlamFigures { frames_on_map, late_frames, relocalisations, .. } = self.figures;
+        Counts { frames_on_map, late_frames, relocalisations }
+    }
+
+    /// Works until the tracker has no more frames, or `observe` asks for an end.
     pub(super) fn run(
         &mut self,
         link: MapperLink,
-        observe: &mut impl FnMut(SlamProgress),
-    ) -> Result<(), RunError> {
+        observe: &mut impl FnMut(SlamProgress) -> ControlFlow<()>,
+    ) -> Result<(), SlamError> {
         let MapperLink { frames, instructions } = link;
         let is_live = self.settings.arrival == Arrival::RealTime;
         let (mut next, mut flushed) = (None, Instant::now());
@@ -72,6 +132,7 @@ impl BackEnd {
             if is_live {
                 next = frames.try_recv().ok();
             }
+            let index = frame.index;
             let instruction = if next.is_some() {
                 // Behind the camera: only the newest frame is mapped.
                 self.record(&frame)?;
@@ -84,27 +145,37 @@ impl BackEnd {
                     effort_left > 0.0 && next.is_none()
                 })?
             };
+            if let Some(keeper) = &mut self.keeper {
+                keeper.note(index, &instruction);
+            }
             // A tracker that is gone needs no instructions.
             let _ = instructions.send(instruction);
             if flushed.elapsed() >= FLUSH_EVERY {
                 self.writer.flush()?;
                 flushed = Instant::now();
             }
-            observe(SlamProgress::Frames {
+            let flow = observe(SlamProgress::Frames {
                 frames: self.writer.exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),
                 map: self.map.bundle.state.map.size(),
                 loops: self.loops.closed(),
             });
+            if flow.is_break() || self.keeper.as_ref().is_some_and(Keeper::is_due) {
+                self.save()?;
+            }
+            if flow.is_break() {
+                self.writer.flush()?;
+                return Err(SlamError::Stopped);
+            }
         }
         Ok(())
     }
 
-    /// The map, the run, and what was counted.
-    pub(super) fn finish(self) -> (GrowingMap, RunWriter, SlamFigures) {
+    /// The map, the run, what was counted, and what keeps it.
+    pub(super) fn finish(self) -> (GrowingMap, RunWriter, SlamFigures, Option<Keeper>) {
         let (loops, retired_keyframes) = (self.loops.closed(), self.map.retired);
         let figures = SlamFigures { loops, retired_keyframes, ..self.figures };
-        (self.map, self.writer, figures)
+        (self.map, self.writer, figures, self.keeper)
     }
 
     /// Adds a frame to the run; returns its exposure.
@@ -241,4 +312,32 @@ impl BackEnd {
             .iter()
             .fold(*exposure, |exposure, new_world_from_world| exposure.seen_from(new_world_from_world))
     }
+}
+
+/// The images of keyframes, from the data set.
+pub(super) fn keyframe_images(
+    dataset: &Dataset,
+    saved: &[SavedKeyframe],
+) -> Result<Vec<RgbdFrame>, SlamError> {
+    let image = |saved: &SavedKeyframe| {
+        let unusable = |reason: String| SlamError::Keyframe { index: saved.index, reason };
+        dataset.frame(saved.index).map_err(|error| unusable(error.to_string()))
+    };
+    saved.iter().map(image).collect()
+}
+
+/// Keyframes from their images.
+pub(super) fn keyframes(
+    sensor: &Sensor,
+    saved: &[SavedKeyframe],
+    images: &[RgbdFrame],
+) -> Result<Vec<Keyframe>, SlamError> {
+    let keyframe = |(saved, image): (&SavedKeyframe, &RgbdFrame)| {
+        let reason = || "its size is not the camera's".to_owned();
+        let observation = ObservationPyramid::new(sensor, image, LEVELS)
+            .ok_or_else(|| SlamError::Keyframe { index: saved.index, reason: reason() })?;
+        let prior = PathPrior { middle: pose(saved.middle), motion: None };
+        Ok(Keyframe::new(saved.index, observation, prior))
+    };
+    saved.iter().zip(images).map(keyframe).collect()
 }

@@ -1,5 +1,6 @@
 //! Why SLAM stopped.
 
+use crate::checkpoint::CheckpointError;
 use crate::mapping::MapError;
 use crate::run::RunError;
 use crate::tracking::TrackingError;
@@ -14,6 +15,20 @@ pub enum SlamError {
     /// There is no map.
     #[error(transparent)]
     Map(#[from] MapError),
+    /// The checkpoint cannot be used or written.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
+    /// A keyframe of a run that was stopped cannot be read any more.
+    #[error("keyframe {index} of the stopped run cannot be used: {reason}")]
+    Keyframe {
+        /// Index of the frame in the data set.
+        index: usize,
+        /// Why.
+        reason: String,
+    },
+    /// Whoever watches asked for it; the folder is up to date.
+    #[error("stopped on request")]
+    Stopped,
     /// The results cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),

@@ -9,9 +9,10 @@ use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
 
 use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink};
 use super::pace::Pace;
+use super::saved::Replay;
 use super::settings::Arrival;
 use crate::dataset::Dataset;
-use crate::tracking::{TrackingError, held, record, timed, timed_result, tracker_view};
+use crate::tracking::{TrackingError, add_gyroscope, held, record, timed, timed_result, tracker_view};
 use crate::trajectory_file::TimedExposure;
 
 /// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
@@ -52,12 +53,14 @@ impl Given {
     }
 }
 
-/// Tracks the data set frame by frame until its end, or until nobody listens any more.
+/// Tracks the data set frame by frame until its end, or until nobody listens any more. Frames that were mapped before are
+/// tracked as they were then.
 pub(super) fn run(
     dataset: &Dataset,
     config: &TrackerConfig,
     arrival: Arrival,
     link: TrackerLink,
+    mut replay: Replay,
 ) -> Result<(), TrackingError> {
     let mut memory = vec![0; config.workspace_len()];
     let tracker = Tracker::new(config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
@@ -66,11 +69,15 @@ pub(super) fn run(
     let pace = Pace::new(arrival, dataset.timestamp(0), 1.0 / dataset.calibration().frame_rate);
     for index in 0..dataset.len() {
         let arrived = pace.wait_for(dataset.timestamp(index));
-        let instructions = front_end.instructions(arrival, index);
+        let told_before = index.checked_sub(AHEAD).filter(|told| replay.has(*told));
+        let instructions = match told_before {
+            Some(told) => Some(vec![replay.take(told)]),
+            None => front_end.instructions(arrival, index),
+        };
         let Some(instructions) = instructions else { return Ok(()) };
         let tracked =
             if arrived { front_end.track(index, instructions) } else { front_end.skip(index, Skipped::Late) };
-        if link.frames.send(tracked).is_err() {
+        if !replay.has(index) && link.frames.send(tracked).is_err() {
             return Ok(());
         }
     }
@@ -97,7 +104,12 @@ impl FrontEnd<'_, '_> {
             (Ok(()), Ok(image)) => image,
         };
         let begin = Instant::now();
-        let result = match tracker_view(&image).and_then(|frame| self.tracker.track(&frame)) {
+        let previous = self.given.recent.back().copied();
+        let tracked = tracker_view(&image).and_then(|mut frame| {
+            add_gyroscope(&mut frame, self.dataset, previous);
+            self.tracker.track(&frame)
+        });
+        let result = match tracked {
             Ok(result) => result,
             Err(reason) => return self.skip(index, Skipped::Unusable(reason.to_string())),
         };

@@ -2,20 +2,24 @@
 
 use mba_tracker::SimdLevel;
 use mba_tracker::geometry::RigidTransform;
+use mba_tracker::trajectory::ExposureTrajectory;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
 use super::keyframe_choice::{NEW_AREA, Neighbour, is_worth_it, most_dispensable, neighbours};
+use super::saved::{Growth, SavedKeyframe};
 use super::settings::SlamSettings;
 use crate::bundle::{
-    BundleAdjustment, DepthSource, FrameState, Keyframe, ObservationPyramid, PathPrior, Schedule, Sensor,
+    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, ObservationPyramid,
+    PathPrior, Placed, Schedule, Sensor, log_brightness,
 };
 use crate::dataset::RgbdFrame;
+use crate::evaluation::motion_of;
 use crate::exposure::ExposurePath;
 use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.
-const LEVELS: usize = 2;
+pub(super) const LEVELS: usize = 2;
 
 /// The coarser resolution.
 const COARSE: usize = 1;
@@ -63,6 +67,35 @@ impl GrowingMap {
         Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0, retired: 0 }
     }
 
+    /// The map of a run that was stopped, with its keyframes.
+    pub(super) fn restored(
+        sensor: Sensor,
+        settings: &SlamSettings,
+        (keyframes, state): (Vec<Keyframe>, BundleState),
+        (max_gaussians, growth): (usize, Growth),
+    ) -> Self {
+        let mut map = Self::new(sensor, settings);
+        for (keyframe, frame) in keyframes.into_iter().zip(&state.frames) {
+            map.bundle.push(keyframe, frame.clone());
+        }
+        map.bundle.state = state;
+        map.bundle.allow(max_gaussians);
+        // Every second step draws a number.
+        map.random.advance(growth.steps as u64 / 2);
+        let Growth { effort, steps, seen, retired } = growth;
+        Self { effort, steps, seen, retired, ..map }
+    }
+
+    /// How far the map has grown.
+    pub(super) fn growth(&self) -> Growth {
+        Growth { effort: self.effort, steps: self.steps, seen: self.seen, retired: self.retired }
+    }
+
+    /// The keyframes, as a checkpoint keeps them.
+    pub(super) fn saved_keyframes(&self) -> Vec<SavedKeyframe> {
+        self.bundle.keyframes().iter().map(SavedKeyframe::from).collect()
+    }
+
     /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.
     pub(super) fn take(&mut self, exposure: &TimedExposure, blur_px: f64, image: &RgbdFrame) -> bool {
         let camera = self.sensor.camera;
@@ -74,11 +107,11 @@ impl GrowingMap {
             return false;
         }
         let Some(observation) = ObservationPyramid::new(&self.sensor, image, LEVELS) else { return false };
-        let path = ExposurePath::through(exposure);
+        let path = self.path_over(exposure, image.exposure_seconds, image.depth_timestamp - image.timestamp);
         let path = if self.settings.blur { path } else { ExposurePath::still(path.mid()) };
         let prior = PathPrior { middle: path.ends.mid(), motion: None };
         let mut state = FrameState::new(path);
-        state.log_gain = near.first().map_or(0.0, |near| self.bundle.state.frames[near.keyframe].log_gain);
+        state.log_gain = near.first().map_or(0.0, |near| self.log_gain(near.keyframe, &observation, &state));
         self.bundle.push(Keyframe::new(image.index, observation, prior), state);
         self.seed();
         if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
@@ -90,11 +123,27 @@ impl GrowingMap {
         true
     }
 
+    /// Logarithm of the gain of a new frame, told from keyframe `k` near it.
+    fn log_gain(&self, k: usize, observation: &ObservationPyramid, frame: &FrameState) -> f64 {
+        let (known, state) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
+        let there = Placed { seen: known.observation.level(COARSE), world_from_camera: state.path.mid() };
+        let here = Placed { seen: observation.level(COARSE), world_from_camera: frame.path.mid() };
+        let ratio = log_brightness(&self.sensor.inverse_response, there, here).unwrap_or(0.0);
+        state.log_gain + if ratio.abs() > NOTICEABLE { ratio } else { 0.0 }
+    }
+
+    /// The path over all the time in which anything of a frame was measured.
+    fn path_over(&self, exposure: &TimedExposure, seconds: f64, depth_offset: f64) -> ExposurePath {
+        let (_, stretch) = self.sensor.times(seconds, depth_offset);
+        long_path(exposure, stretch)
+    }
+
     /// Takes a better estimate of a frame that may be a keyframe.
     pub(super) fn revise(&mut self, index: usize, exposure: &TimedExposure) {
         let known = self.bundle.keyframes().iter().position(|keyframe| keyframe.index == index);
         if let Some(k) = known.filter(|_| self.settings.blur) {
-            self.bundle.state.frames[k].path = ExposurePath::through(exposure);
+            let exposure_share = self.bundle.keyframes()[k].observation.level(0).times.exposure;
+            self.bundle.state.frames[k].path = long_path(exposure, 1.0 / exposure_share);
         }
     }
 
@@ -153,4 +202,14 @@ impl GrowingMap {
         let any = (u64::from(self.random.next_u32()) * near.len() as u64) >> 32;
         near.get(any as usize).map_or(local, |near| near.keyframe)
     }
+}
+
+/// The path over `stretch` times the exposure. Over a longer time than the exposure it is straight: what a bow adds grows
+/// with the square of time.
+fn long_path(exposure: &TimedExposure, stretch: f64) -> ExposurePath {
+    if stretch == 1.0 {
+        return ExposurePath::through(exposure);
+    }
+    let motion = motion_of(exposure).motion() * stretch;
+    ExposurePath::linear(ExposureTrajectory::from_mid_and_motion(&exposure.mid, &motion))
 }

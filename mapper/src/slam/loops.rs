@@ -1,12 +1,14 @@
 //! Places that are seen again: the drift since, and the way back for a tracker that is lost.
 
 use mba_tracker::TrackerConfig;
-use mba_tracker::geometry::RigidTransform;
+use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 
 use super::growing_map::GrowingMap;
 use super::keyframe_choice::view_change;
 use super::messages::SharpView;
+use super::saved::SavedLoops;
 use super::second_look::{SecondLook, Sighting};
+use crate::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use crate::dataset::RgbdFrame;
 use crate::places::{PlaceDescriptor, PlaceIndex};
 use crate::pose_graph::{PoseGraph, PoseGraphEdge, PoseGraphSettings};
@@ -50,6 +52,28 @@ struct Closure {
 impl Loops {
     pub(super) fn new(config: &TrackerConfig) -> Self {
         Self { look: SecondLook::new(config), places: PlaceIndex::default(), closed: Vec::new(), pause: 0 }
+    }
+
+    /// What was known of places and loops when a run was stopped; `keyframes` are the images of the keyframes.
+    pub(super) fn restore(&mut self, saved: &SavedLoops, keyframes: &[RgbdFrame], camera: &PinholeCamera) {
+        for image in keyframes {
+            if let Ok(descriptor) = PlaceDescriptor::new(&image.rgb, camera) {
+                self.places.push(image.index, descriptor);
+            }
+        }
+        let closure = |(before, now, motion): &(usize, usize, PoseNumbers)| Closure {
+            before: *before,
+            now: *now,
+            before_from_now: pose(*motion),
+        };
+        self.closed = saved.closed.iter().map(closure).collect();
+        self.pause = saved.pause;
+    }
+
+    /// The loops that were closed, as a checkpoint keeps them.
+    pub(super) fn saved(&self) -> SavedLoops {
+        let closed = self.closed.iter().map(|c| (c.before, c.now, numbers(&c.before_from_now))).collect();
+        SavedLoops { closed, pause: self.pause }
     }
 
     /// For questions about views.

@@ -6,6 +6,9 @@
 //! step the tracker follows the instructions of the frame before last, so that both threads are busy and the result is
 //! still the same on every machine.
 //!
+//! A run in lock step that is stopped leaves a checkpoint; started again with `resume` it ends with the same
+//! files, bit for bit, as one that was never stopped.
+//!
 //! After the last frame all of the map is refined together with all paths, as [`crate::mapping`] does.
 
 mod back_end;
@@ -17,6 +20,7 @@ mod keyframe_choice;
 mod loops;
 mod messages;
 mod pace;
+mod saved;
 mod second_look;
 mod settings;
 mod sharp_view;

@@ -54,7 +54,7 @@ impl SecondLook {
         };
         let result = { align }().ok()?;
         (result.status == FrameStatus::Ok && result.inliers > MIN_INLIERS)
-            .then(|| Sighting { world_from_camera: result.world_from_mid, residual: result.residual })
+            .then_some(Sighting { world_from_camera: result.world_from_mid, residual: result.residual })
     }
 
     /// A keyframe as a sharp view: deblurred with its own motion.
@@ -65,8 +65,9 @@ impl SecondLook {
         depth_scale: f64,
     ) -> SharpView {
         let image = keyframe.observation.level(0).frame(keyframe.index, depth_scale);
-        let deblurred = self.deblurrer.deblur(&image, &state.path.timed(0.0), &mut self.deblur_memory);
+        let exposure = state.path.stretched(keyframe.observation.level(0).times.exposure).timed(0.0);
+        let deblurred = self.deblurrer.deblur(&image, &exposure, &mut self.deblur_memory);
         let rgb = deblurred.map_or_else(|_| image.rgb.clone(), |deblurred| deblurred.rgb);
-        SharpView { rgb, depth: image.depth, world_from_camera: state.path.ends.mid(), start_from: None }
+        SharpView { rgb, depth: image.depth, world_from_camera: exposure.mid, start_from: None }
     }
 }

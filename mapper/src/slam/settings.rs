@@ -56,6 +56,9 @@ pub struct SlamSettings {
     pub time_budget: Option<Duration>,
     /// When frames arrive.
     pub arrival: Arrival,
+    /// Time between two checkpoints, in lock step; zero for one after every frame and step. It does not change the
+    /// result.
+    pub checkpoint_interval: Duration,
     /// Seed of the choice of keyframes to visit.
     pub seed: u64,
 }
@@ -74,6 +77,7 @@ impl Default for SlamSettings {
             max_gaussians: None,
             time_budget: None,
             arrival: Arrival::default(),
+            checkpoint_interval: MapSettings::default().checkpoint_interval,
             seed: 1,
         }
     }

@@ -25,7 +25,7 @@ pub use error::SurfaceError;
 pub use field::{FieldBox, mesh_from_field};
 pub use map_views::MapViews;
 pub use mesh::Mesh;
-pub use mesh_file::{format_mesh, parse_mesh, read_mesh, write_mesh};
+pub use mesh_file::{format_mesh, is_own_mesh, parse_mesh, read_mesh, write_mesh};
 pub use of_field::surface_of_field;
 pub use sampling::sample_surface;
 pub use sight::{Sight, Trim};

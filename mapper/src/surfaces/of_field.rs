@@ -147,7 +147,7 @@ mod tests {
 
     use super::*;
     use crate::bundle::{Exposure, Observation, Sensor};
-    use crate::exposure::ExposurePath;
+    use crate::exposure::{ExposurePath, RowTimes, RowTiming};
     use crate::surfaces::MapViews;
     use crate::triplane::{
         FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
@@ -166,9 +166,22 @@ mod tests {
         let region = PixelRectangle { left: 0, top: 0, right: CAMERA.width, bottom: CAMERA.height };
         let plane = || vec![120; pixels];
         let colour = [plane(), plane(), plane()];
-        let seen = Observation { camera: CAMERA, colour, depth: vec![WALL; pixels], region };
-        let sensor =
-            Sensor { camera: CAMERA, inverse_response: InverseResponse::srgb(), depth_scale: 5000.0, region };
+        let seen = Observation {
+            camera: CAMERA,
+            colour,
+            depth: vec![WALL; pixels],
+            region,
+            times: RowTimes::GLOBAL,
+            falloff: None,
+        };
+        let sensor = Sensor {
+            camera: CAMERA,
+            inverse_response: InverseResponse::srgb(),
+            depth_scale: 5000.0,
+            region,
+            rows: RowTiming::default(),
+            falloff: None,
+        };
         let still = RigidTransform::identity();
         let path = ExposurePath::linear(ExposureTrajectory { start: still, end: still });
         let region = Region::around([-0.6, -0.5, 0.0], [0.6, 0.5, 1.1]);

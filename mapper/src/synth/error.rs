@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use crate::FileError;
+use crate::output::OutputError;
 
 /// A synthetic sequence could not be made or written.
 #[derive(Debug, thiserror::Error)]
@@ -61,14 +62,9 @@ pub enum SynthError {
         /// The folder.
         folder: PathBuf,
     },
-    /// An image cannot be encoded or written.
-    #[error("cannot write {path}: {reason}")]
-    Image {
-        /// The file.
-        path: PathBuf,
-        /// What went wrong.
-        reason: image::ImageError,
-    },
+    /// The folder must not be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
     /// A text file cannot be read or written.
     #[error(transparent)]
     File(#[from] FileError),

@@ -223,7 +223,9 @@ fn covered_and_flooded_frames_show_nothing_and_a_jump_shows_the_beginning_again(
         let frame = disturbed.render_frame(index);
         assert!(frame.rgb.iter().all(|byte| *byte == value) && frame.depth.iter().all(|depth| *depth == 0));
         assert_eq!(frame.rgb.len(), 3 * 96 * 72);
+        assert!(disturbed.seen_points(index).is_empty());
     }
+    assert_eq!(disturbed.seen_points(0).len(), 96 * 72);
     // The mean blur is now that of frames 0 to 3, 0 and 1, so the shake is a little stronger or weaker.
     let [first, again, second, later] =
         [0, 4, 1, 5].map(|index| disturbed.render_frame(index).world_from_camera);
@@ -233,7 +235,6 @@ fn covered_and_flooded_frames_show_nothing_and_a_jump_shows_the_beginning_again(
     assert!(pose.tangent_to(&again).norm() < 1e-12, "poses by time jump as well");
     let before = disturbed.world_from_camera(disturbed.timestamp(4) - 0.6 / 30.0);
     assert!(before.tangent_to(&first).norm() > 5.0 * again.tangent_to(&first).norm() + 1e-3);
-    // Files round to microseconds.
     assert_eq!(disturbed.timestamp(4), plain.timestamp(4));
     assert_ne!(disturbed.render_frame(4).rgb, disturbed.render_frame(0).rgb, "noise is its own");
 }

@@ -239,8 +239,12 @@ impl SynthSequence {
         surface::points(self)
     }
 
-    /// The points of the world that the pixels of frame `index` see at mid exposure, without noise.
+    /// The points of the world that the pixels of frame `index` see at mid exposure, without noise; none if it is covered
+    /// or flooded.
     pub(super) fn seen_points(&self, index: usize) -> Vec<[f32; 3]> {
+        if self.config.events.flood(index).is_some() {
+            return Vec::new();
+        }
         let [_, world_from_camera, _] = self.exposure_poses(index, 0.0);
         let samples = render::depth(&self.scene, self.size(), &View::new(&self.camera, &world_from_camera));
         let point = |(pixel, sample): (usize, &DepthSample)| {

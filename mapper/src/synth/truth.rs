@@ -1,10 +1,10 @@
 //! What a data set does not say about its camera, for judging who finds it out.
 
-use std::fs;
 use std::path::Path;
 
 use super::{ResponseCurve, SynthError, SynthSequence, description};
 use crate::dataset::Vignetting;
+use crate::whole_file::write_text;
 
 /// Folder in the data set.
 pub(super) const FOLDER: &str = "truth";
@@ -27,8 +27,7 @@ pub(super) fn write(sequence: &SynthSequence, folder: &Path) -> Result<(), Synth
     ];
     texts.extend(description::response_table(&config.response));
     for (name, text) in texts {
-        let path = folder.join(name);
-        fs::write(&path, text).map_err(|reason| SynthError::unwritable(path, reason))?;
+        write_text(&folder.join(name), &text)?;
     }
     Ok(())
 }

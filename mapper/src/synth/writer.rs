@@ -1,18 +1,19 @@
 //! A synthetic sequence as a data set on disk.
 
 use std::fmt::Write as _;
-use std::fs::{self, File};
-use std::io::BufWriter;
-use std::path::Path;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ImageBuffer, Luma, PixelWithColorType, Rgb};
 use rayon::prelude::*;
 
 use super::{BlurFigure, SynthError, SynthSequence, description, inertial, truth};
+use crate::output::OutputFolder;
+use crate::png::{encode_depth, encode_rgb};
 use crate::surfaces::{Mesh, write_mesh};
 use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory};
+use crate::whole_file::{write_text, write_together};
 
 /// What was written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +37,32 @@ struct Written {
 /// Folder of the views that no frame sees.
 const HELDOUT_FOLDER: &str = "heldout_views";
 
+/// File of the poses of those views, in their folder.
+const POSES_FILE: &str = "poses.txt";
+
+/// Folders of images.
+const IMAGE_FOLDERS: [&str; 4] = ["rgb", "depth", "sharp", HELDOUT_FOLDER];
+
+/// Texts and the surface, in the folder itself or among what is not on record.
+const FILES: [&str; 13] = [
+    "groundtruth.txt",
+    "groundtruth_exposure.txt",
+    SURFACE_FILE,
+    "rgb.txt",
+    "depth.txt",
+    "associations.txt",
+    "blur.csv",
+    "imu.csv",
+    "exposures.csv",
+    "response.csv",
+    "response_table.csv",
+    "README.md",
+    CALIBRATION_FILE,
+];
+
+/// File that a complete data set has.
+const CALIBRATION_FILE: &str = "calibration.toml";
+
 /// File of points of the true surface.
 const SURFACE_FILE: &str = "surface_points.ply";
 
@@ -44,17 +71,33 @@ const SURFACE_FILE: &str = "surface_points.ply";
 /// them, with exposure times, a recording of an IMU, and what is not on record in a folder `truth`. Calls
 /// `progress(done, frames)` after each frame, from any thread and in any order.
 ///
-/// The folder is made if it does not exist. The calibration is written last, so that a folder with it is complete.
+/// The folder is made if it does not exist. The calibration is written last, so that a folder with it is complete; what
+/// a process that was killed left of one without is replaced.
 ///
 /// # Errors
 ///
-/// [`SynthError::FolderNotEmpty`], or a file that cannot be written; what was written so far stays.
+/// [`SynthError::FolderNotEmpty`], or a file that cannot be written; what was written so far is removed.
 pub fn write_dataset(
     sequence: &SynthSequence,
     folder: &Path,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Summary, SynthError> {
-    prepare(folder, sequence.config().sensor.is_on_record)?;
+    let claimed = prepare(folder)?;
+    let summary = write_all(sequence, folder, progress).inspect_err(|_| clear(folder))?;
+    drop(claimed);
+    Ok(summary)
+}
+
+fn write_all(
+    sequence: &SynthSequence,
+    folder: &Path,
+    progress: impl Fn(usize, usize) + Sync,
+) -> Result<Summary, SynthError> {
+    let truth = (!sequence.config().sensor.is_on_record).then_some(truth::FOLDER);
+    for name in IMAGE_FOLDERS.into_iter().chain(truth) {
+        let path = folder.join(name);
+        fs::create_dir(&path).map_err(|reason| SynthError::unwritable(path, reason))?;
+    }
     let done = AtomicUsize::new(0);
     let write_counted = |index| {
         let written = write_frame(sequence, folder, index)?;
@@ -72,8 +115,7 @@ pub fn write_dataset(
         truth::write(sequence, folder)?;
     }
     for (name, text) in texts(sequence, &summary, &written) {
-        let path = folder.join(name);
-        fs::write(&path, text).map_err(|reason| SynthError::unwritable(path, reason))?;
+        write_text(&folder.join(name), &text)?;
     }
     Ok(summary)
 }
@@ -95,50 +137,66 @@ fn texts(sequence: &SynthSequence, summary: &Summary, written: &[Written]) -> Ve
         texts
             .extend(config.sensor.auto_exposure.then(|| ("exposures.csv", description::exposures(sequence))));
         texts.extend(description::response_table(&config.response));
-        texts.push(("calibration.toml", description::calibration(sequence)));
+        texts.push((CALIBRATION_FILE, description::calibration(sequence)));
     } else {
-        texts.push(("calibration.toml", description::bare_calibration(sequence)));
+        texts.push((CALIBRATION_FILE, description::bare_calibration(sequence)));
     }
     texts
 }
 
-fn prepare(folder: &Path, is_on_record: bool) -> Result<(), SynthError> {
-    let unwritable = |reason| SynthError::unwritable(folder, reason);
-    fs::create_dir_all(folder).map_err(unwritable)?;
-    if fs::read_dir(folder).map_err(unwritable)?.next().is_some() {
+/// Claims a folder that is new, empty, or left by a process that was killed before it was done.
+fn prepare(folder: &Path) -> Result<OutputFolder, SynthError> {
+    if OutputFolder::is_in_use_by_others(folder) || folder.join(CALIBRATION_FILE).exists() {
         return Err(SynthError::FolderNotEmpty { folder: folder.to_owned() });
     }
-    let truth = (!is_on_record).then_some(truth::FOLDER);
-    for name in ["rgb", "depth", "sharp", HELDOUT_FOLDER].into_iter().chain(truth) {
-        let path = folder.join(name);
-        fs::create_dir(&path).map_err(|reason| SynthError::unwritable(path, reason))?;
+    let claimed = OutputFolder::for_data_set(folder)?;
+    clear(folder);
+    Ok(claimed)
+}
+
+/// Removes the files of a data set that is not complete, and nothing else. What cannot be removed stays: it is in nobody's
+/// way but that of the next data set, which says so.
+fn clear(folder: &Path) {
+    let remove = |path: PathBuf| {
+        let _ = fs::remove_file(path.with_added_extension("partial"));
+        let _ = fs::remove_file(path);
+    };
+    for images in IMAGE_FOLDERS.map(|name| folder.join(name)) {
+        for file in fs::read_dir(&images).into_iter().flatten().flatten() {
+            let name = file.file_name();
+            if name.to_str().is_some_and(is_own_image) {
+                remove(file.path());
+            }
+        }
+        remove(images.join(POSES_FILE));
+        let _ = fs::remove_dir(images);
     }
-    Ok(())
+    let truth = folder.join(truth::FOLDER);
+    for place in [&truth, folder] {
+        FILES.iter().for_each(|name| remove(place.join(name)));
+    }
+    let _ = fs::remove_dir(truth);
+}
+
+/// Whether a file is named like an image of a data set, or like one that is being written.
+fn is_own_image(name: &str) -> bool {
+    let stem = name.strip_suffix(".partial").unwrap_or(name).strip_suffix(".png");
+    stem.is_some_and(|stem| stem.len() >= 6 && stem.bytes().all(|byte| byte.is_ascii_digit()))
 }
 
 fn write_frame(sequence: &SynthSequence, folder: &Path, index: usize) -> Result<Written, SynthError> {
     let frame = sequence.render_frame(index);
     let path = |kind: &str| folder.join(kind).join(format!("{index:06}.png"));
     let size = [frame.width, frame.height];
-    write_png::<Rgb<u8>>(&path("rgb"), size, frame.rgb)?;
-    write_png::<Luma<u16>>(&path("depth"), size, frame.depth)?;
-    write_png::<Rgb<u8>>(&path("sharp"), size, sequence.render_sharp(index))?;
+    write_png(path("rgb"), encode_rgb(size, &frame.rgb))?;
+    write_png(path("depth"), encode_depth(size, &frame.depth))?;
+    write_png(path("sharp"), encode_rgb(size, &sequence.render_sharp(index)))?;
     Ok(Written { blur: frame.blur, sub_frames: frame.sub_frames })
 }
 
-fn write_png<P>(path: &Path, [width, height]: [usize; 2], values: Vec<P::Subpixel>) -> Result<(), SynthError>
-where
-    P: PixelWithColorType,
-    [P::Subpixel]: image::EncodableLayout,
-{
-    let file = File::create(path).map_err(|reason| SynthError::unwritable(path, reason))?;
-    let encoder =
-        PngEncoder::new_with_quality(BufWriter::new(file), CompressionType::Fast, FilterType::Adaptive);
-    let Some(image) = ImageBuffer::<P, _>::from_raw(width as u32, height as u32, values) else {
-        return Ok(());
-    };
-    let failed = |reason| SynthError::Image { path: path.to_owned(), reason };
-    image.write_with_encoder(encoder).map_err(failed)
+fn write_png(path: PathBuf, png: io::Result<Vec<u8>>) -> Result<(), SynthError> {
+    let png = png.map_err(|reason| SynthError::unwritable(&path, reason))?;
+    Ok(write_together(&[(path, png)])?)
 }
 
 fn summarise(written: &[Written]) -> Summary {
@@ -174,9 +232,9 @@ fn write_heldout_views(sequence: &SynthSequence, folder: &Path) -> Result<(), Sy
     let poses = sequence.heldout_poses();
     poses.par_iter().enumerate().try_for_each(|(index, pose)| {
         let rgb = sequence.render_view(&pose.world_from_camera);
-        write_png::<Rgb<u8>>(&folder.join(format!("{index:06}.png")), size, rgb)
+        write_png(folder.join(format!("{index:06}.png")), encode_rgb(size, &rgb))
     })?;
-    Ok(write_trajectory(&folder.join("poses.txt"), &poses)?)
+    Ok(write_trajectory(&folder.join(POSES_FILE), &poses)?)
 }
 
 /// `rgb.txt` or `depth.txt`. Writing to a string cannot fail.

@@ -11,6 +11,7 @@ use super::layers::Layers;
 use super::march::{Ray, first_surfaces};
 use super::opacity::{Opacity, weigh, weigh_backward};
 use super::prepared::{FieldSamples, Prepared};
+use super::ray_views::RayViews;
 use super::sampling::{MidDepth, Motion, NEAREST, SamplingSettings, stratified};
 use crate::bundle::{CLIPPED, DisplayCurve, NOISE, Observation, smooth_absolute};
 
@@ -25,6 +26,7 @@ const CENTRE: f32 = 0.4;
 pub(super) struct View {
     /// From the camera to the field's coordinates.
     pub(super) field_from_camera: Motion,
+    /// To the camera at the time of its depth.
     pub(super) mid_from_camera: Motion,
     pub(super) world_from_camera: RigidTransform,
 }
@@ -36,6 +38,7 @@ pub(super) struct Job<'a> {
     pub(super) curve: &'a DisplayCurve,
     pub(super) gain: f32,
     pub(super) views: &'a [View],
+    pub(super) rays: RayViews,
     pub(super) weights: FieldWeights,
     pub(super) sampling: SamplingSettings,
     /// Whether the gradient by the path is wanted.
@@ -65,6 +68,8 @@ pub(super) struct Sums {
 #[derive(Clone, Copy, Debug)]
 struct Pixel {
     index: usize,
+    /// First of its views.
+    first_view: usize,
     /// `x/z` and `y/z` of its ray.
     slope: [f32; 2],
     /// Measured depth, metres, 0 if there is none.
@@ -140,15 +145,19 @@ impl Chunk {
             let ray = camera.ray(u as f64, v as f64);
             let measured = job.seen.depth[index];
             let surface = (measured > 0.0).then_some(measured);
-            self.pixels.push(Pixel { index, slope: [ray.x as f32, ray.y as f32], measured, surface });
+            let (first_view, slope) = (job.rays.first(v), [ray.x as f32, ray.y as f32]);
+            self.pixels.push(Pixel { index, first_view, slope, measured, surface });
         }
     }
 
     /// Looks in the field for the surfaces of pixels without a measured depth.
     fn find_surfaces(&mut self, job: &Job<'_>) {
-        let view = &job.views[job.views.len() / 2];
         let unknown = self.pixels.iter_mut().filter(|pixel| pixel.surface.is_none());
-        let rays: Vec<Ray> = unknown.map(|pixel| within_box(job, view, ray(view, pixel.slope))).collect();
+        let seen = |pixel: &mut Pixel| {
+            let view = &job.views[pixel.first_view + job.rays.of_depth];
+            within_box(job, view, ray(view, pixel.slope))
+        };
+        let rays: Vec<Ray> = unknown.map(seen).collect();
         let found = first_surfaces(job.field, &rays, &mut self.geometry);
         let unknown = self.pixels.iter_mut().filter(|pixel| pixel.surface.is_none());
         unknown.zip(found).for_each(|(pixel, found)| pixel.surface = found);
@@ -158,19 +167,20 @@ impl Chunk {
     fn place_samples(&mut self, job: &Job<'_>, random: &mut Pcg32) {
         let truncation = job.field.field.settings.truncation;
         let depth = MidDepth::new(job.seen);
-        let middle = job.views.len() / 2;
+        let of_depth = job.rays.of_depth;
         self.rays.clear();
         self.z.clear();
         self.geometry.clear();
         for (k, pixel) in self.pixels.iter().enumerate() {
-            for (number, view) in job.views.iter().enumerate() {
+            let views = &job.views[pixel.first_view..pixel.first_view + job.rays.per_pixel];
+            for (number, view) in views.iter().enumerate() {
                 let (start, z) = (self.z.len(), &mut self.z);
                 let ray = ray(view, pixel.slope);
                 match pixel.surface {
-                    Some(depth) if pixel.measured > 0.0 && number == middle => {
+                    Some(depth) if pixel.measured > 0.0 && number == of_depth => {
                         job.sampling.measured(random, depth, truncation, z);
                     }
-                    Some(surface) if number == middle => {
+                    Some(surface) if number == of_depth => {
                         job.sampling.expected(random, [surface; 2], truncation, z);
                     }
                     Some(surface) => {
@@ -182,7 +192,8 @@ impl Chunk {
                     }
                 }
                 self.geometry.extend(self.z[start..].iter().map(|z| ray.at(*z)));
-                self.rays.push(PixelRay { pixel: k, view: number, start, end: self.z.len() });
+                let view = pixel.first_view + number;
+                self.rays.push(PixelRay { pixel: k, view, start, end: self.z.len() });
             }
         }
     }
@@ -230,13 +241,14 @@ impl Chunk {
         self.colour.start_backward();
         self.by_weights.clear();
         self.by_weights.resize(self.z.len(), 0.0);
-        let views = job.views.len();
+        let RayViews { per_pixel, of_light, of_depth, .. } = job.rays;
         let mut by_light = Vec::with_capacity(self.rays.len());
         for k in 0..self.pixels.len() {
             let by_pixel = self.compare_colour(job, k);
-            by_light.extend((0..views).map(|_| by_pixel.map(|by| by / views as f32)));
+            by_light.extend((0..of_light).map(|_| by_pixel.map(|by| by / of_light as f32)));
+            by_light.extend((of_light..per_pixel).map(|_| [0.0; 3]));
             if self.pixels[k].measured > 0.0 {
-                self.compare_depth(job, k, k * views + views / 2);
+                self.compare_depth(job, k, k * per_pixel + of_depth);
             }
         }
         self.colours_backward(job, &by_light);
@@ -259,27 +271,29 @@ impl Chunk {
 
     /// Compares the mean light of the rays of a pixel with what was captured; returns the gradient by it.
     fn compare_colour(&mut self, job: &Job<'_>, k: usize) -> [f32; 3] {
-        let views = job.views.len();
-        let rays = &self.light[k * views..(k + 1) * views];
+        let RayViews { per_pixel, of_light: views, .. } = job.rays;
+        let rays = &self.light[k * per_pixel..k * per_pixel + views];
+        let index = self.pixels[k].index;
+        let gain = job.seen.falloff.as_ref().map_or(job.gain, |falloff| job.gain * falloff[index]);
         let share = 1.0 / (3 * job.pixels) as f32;
         core::array::from_fn(|channel| {
             let light = rays.iter().map(|light| light[channel]).sum::<f32>() / views as f32;
-            let byte = job.seen.colour[channel][self.pixels[k].index];
+            let byte = job.seen.colour[channel][index];
             let target = f32::from(byte) * (1.0 / 255.0);
-            let [value, slope] = job.curve.at(job.gain * light);
+            let [value, slope] = job.curve.at(gain * light);
             if byte >= CLIPPED && value > target {
                 return 0.0;
             }
             let (loss, by_value) = smooth_absolute(value - target, NOISE);
             self.sums.colour += job.weights.colour * share * loss;
             self.sums.mean_square += share * (value - target) * (value - target);
-            let by_light = job.weights.colour * share * by_value * slope * job.gain;
+            let by_light = job.weights.colour * share * by_value * slope * gain;
             self.sums.by_log_gain += by_light * light;
             by_light
         })
     }
 
-    /// Compares depth and signed distances along a ray at mid exposure with the measured depth. The means of the paper
+    /// Compares depth and signed distances along the ray of depth with the measured depth. The means of the paper
     /// are taken over the samples that a set has on average if all pixels have a depth.
     fn compare_depth(&mut self, job: &Job<'_>, k: usize, ray: usize) {
         let (measured, weights) = (self.pixels[k].measured, &job.weights);

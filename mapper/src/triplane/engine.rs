@@ -2,7 +2,6 @@
 
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
-use mba_tracker::trajectory::SampleRule;
 use nalgebra::SVector;
 use rayon::prelude::*;
 
@@ -10,6 +9,7 @@ use super::chunk::{CHUNK, Chunk, Job, View};
 use super::field::TriplaneField;
 use super::gradients::{FieldGradients, Group};
 use super::prepared::Prepared;
+use super::ray_views::RayViews;
 use super::sampling::{Motion, SamplingSettings};
 use crate::bundle::{DisplayCurve, Exposure, ExposureLoss, LossTerms, Sensor};
 use crate::exposure::{ExposurePath, PATH_PARAMETERS};
@@ -82,15 +82,16 @@ impl TriplaneEngine {
     /// on the number of threads.
     ///
     /// Each chosen pixel is the mean in linear light of its rays in all virtual views (MBA-SLAM eq. 3), times the gain,
-    /// through the camera's response. Depth is compared at mid exposure. An even number of views counts as the next odd
+    /// through the lens and the camera's response. Depth is compared at the time of the depth image. An even number of views counts as the next odd
     /// one. Without pixels, or with an empty region, the loss is zero.
     pub fn evaluate(&mut self, field: &TriplaneField, given: &FieldExposure<'_>) -> ExposureLoss {
         let Exposure { seen, path, gain, views } = given.exposure;
         let empty = seen.region.left >= seen.region.right || seen.region.top >= seen.region.bottom;
         let pixels = if empty { 0 } else { given.pixels };
         let prepared = Prepared::new(self.level, field);
-        let times: Vec<f64> = (0..views | 1).map(|k| SampleRule::Midpoint.time(k, views | 1)).collect();
-        let views = virtual_views(&prepared, path, &times);
+        let rays = RayViews::new(&seen.times, views, seen.camera.height);
+        let times = rays.times(&seen.times);
+        let views = virtual_views(&prepared, path, &times, &rays);
         let count = pixels.div_ceil(CHUNK);
         let job = Job {
             field: &prepared,
@@ -98,6 +99,7 @@ impl TriplaneEngine {
             curve: &self.curve,
             gain: gain as f32,
             views: &views,
+            rays,
             weights: given.weights,
             sampling: given.sampling,
             with_path: given.with_path,
@@ -150,10 +152,10 @@ impl TriplaneEngine {
     }
 }
 
-fn virtual_views(field: &Prepared<'_>, path: &ExposurePath, times: &[f64]) -> Vec<View> {
+fn virtual_views(field: &Prepared<'_>, path: &ExposurePath, times: &[f64], rays: &RayViews) -> Vec<View> {
     let poses: Vec<RigidTransform> = times.iter().map(|time| path.at(*time)).collect();
-    let mid_from_world = poses[poses.len() / 2].inverse();
-    let view = |world_from_camera: &RigidTransform| {
+    let view = |(k, world_from_camera): (usize, &RigidTransform)| {
+        let mid_from_world = poses[rays.depth_of(k)].inverse();
         let mut field_from_camera = *world_from_camera;
         field_from_camera.translation -= field.origin;
         View {
@@ -162,7 +164,7 @@ fn virtual_views(field: &Prepared<'_>, path: &ExposurePath, times: &[f64]) -> Ve
             world_from_camera: *world_from_camera,
         }
     };
-    poses.iter().map(view).collect()
+    poses.iter().enumerate().map(view).collect()
 }
 
 #[cfg(test)]
@@ -175,6 +177,7 @@ mod tests {
 
     use super::*;
     use crate::bundle::Observation;
+    use crate::exposure::{RowTimes, RowTiming};
     use crate::triplane::gradients::plane_values_mut;
     use crate::triplane::reference::lively_field;
 
@@ -187,6 +190,8 @@ mod tests {
             inverse_response: InverseResponse::srgb(),
             depth_scale: 5000.0,
             region: PixelRectangle { left: 0, top: 0, right: width, bottom: height },
+            rows: RowTiming::default(),
+            falloff: None,
         }
     }
 
@@ -200,6 +205,8 @@ mod tests {
             colour: [plane(0), plane(1), plane(2)],
             depth: (0..pixels).map(|i| 0.35 + 0.1 * (i % SIZE[0]) as f32 / SIZE[0] as f32).collect(),
             region: sensor.region,
+            times: RowTimes::GLOBAL,
+            falloff: None,
         }
     }
 
@@ -298,7 +305,8 @@ mod tests {
         let (field, path, seen) = (lively_field(), path(), observation());
         let prepared = Prepared::new(Level::new(), &field);
         let curve = DisplayCurve::new(&sensor().inverse_response);
-        let mut views = virtual_views(&prepared, &path, &[0.2, 0.5, 0.8]);
+        let rays = RayViews::new(&RowTimes::GLOBAL, 3, SIZE[1]);
+        let mut views = virtual_views(&prepared, &path, &[0.2, 0.5, 0.8], &rays);
         if let Some((view, tangent)) = moved {
             let mut pose = views[view].world_from_camera.perturbed(&tangent);
             pose.translation -= prepared.origin;
@@ -310,6 +318,7 @@ mod tests {
             curve: &curve,
             gain: 1.0,
             views: &views,
+            rays,
             weights: FieldWeights::default(),
             // Where a sample gets its colour, the loss has a step.
             sampling: SamplingSettings { least_weight: 0.0, ..SamplingSettings::default() },
@@ -335,6 +344,48 @@ mod tests {
                 assert!(error < 0.03 * gradient.norm() + 1e-3, "view {view}, {k}: {gradient}, not {numeric}");
             }
         }
+    }
+
+    /// Loss of an exposure whose rows are exposed one after the other and whose depth is late, with the surface far
+    /// from where samples depend on the pose.
+    fn rolling(path: &ExposurePath, with_path: bool) -> ExposureLoss {
+        let times = RowTimes { exposure: 0.4, readout: 0.6, depth_offset: 0.3, depth_readout: 0.0 };
+        let falloff: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|pixel| 1.0 - 0.001 * pixel as f32).collect();
+        let seen = Observation { times, falloff: Some(falloff.into()), ..observation() };
+        let mut engine = TriplaneEngine::new(Level::new(), &sensor());
+        let exposure = Exposure { seen: &seen, path, gain: 1.1, views: 3 };
+        let given = FieldExposure { with_path, ..drawn(exposure) };
+        engine.evaluate(&lively_field(), &given)
+    }
+
+    #[test]
+    fn rays_have_the_time_of_their_row() {
+        let rays = RayViews::new(&RowTimes::GLOBAL, 2, 18);
+        assert_eq!((rays.per_pixel, rays.of_light, rays.of_depth, rays.first(17)), (3, 3, 1, 0));
+        let times = RowTimes { exposure: 0.4, readout: 0.6, depth_offset: 0.3, depth_readout: 0.0 };
+        let rays = RayViews::new(&times, 3, 18);
+        let all = rays.times(&times);
+        assert_eq!((rays.per_pixel, rays.of_light, rays.of_depth, all.len()), (4, 3, 3, 4 * 18));
+        for v in 0..18 {
+            let first = rays.first(v);
+            let row = 0.5 + ((v as f64 + 0.5) / 18.0 - 0.5) * 0.6;
+            for (k, s) in [1.0 / 6.0, 0.5, 5.0 / 6.0].into_iter().enumerate() {
+                assert!((all[first + k] - (row + (s - 0.5) * 0.4)).abs() < 1e-12, "row {v}, view {k}");
+            }
+            assert!((all[rays.depth_of(first + 1)] - 0.8).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn the_gradient_by_a_path_of_rows_leads_down() {
+        let path = path();
+        let at_path = rolling(&path, true);
+        let step = at_path.by_path * (2e-4 / at_path.by_path.norm());
+        let slope = rolling(&path.perturbed(&step), false).terms.total()
+            - rolling(&path.perturbed(&-step), false).terms.total();
+        // Where samples lie changes with the poses too, and is no part of the gradient.
+        let expected = 2.0 * step.dot(&at_path.by_path);
+        assert!((slope / expected - 1.0).abs() < 0.3, "{slope} instead of {expected}");
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod planes;
 mod prefetch;
 mod prepared;
 mod query;
+mod ray_views;
 #[cfg(test)]
 mod reference;
 mod region;

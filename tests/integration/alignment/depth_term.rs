@@ -7,6 +7,7 @@ use mba_tracker::align::depth_term::{DepthProblem, DepthSums};
 use mba_tracker::geometry::{PinholeCamera, RigidTransform, so3};
 use mba_tracker::simd::{level_name, levels_up_to};
 use mba_tracker::surface::{InverseDepthMap, SurfacePlanes};
+use mba_tracker::transfer::RowBand;
 use mba_tracker::workspace::Arena;
 use nalgebra::Vector6;
 
@@ -40,8 +41,15 @@ fn with_problem(stride: usize, check: impl FnOnce(DepthProblem<'_>)) {
     let mut memory = vec![0; 1 << 20];
     let mut planes = SurfacePlanes::carve(&mut Arena::new(&mut memory), &camera, 0).expect("memory");
     planes.fit(&keyframe);
-    let problem =
-        DepthProblem { current: &current, keyframe: &keyframe, planes: &planes, camera, stride, gate: 0.03 };
+    let problem = DepthProblem {
+        current: &current,
+        keyframe: &keyframe,
+        planes: &planes,
+        camera,
+        stride,
+        gate: 0.03,
+        band: RowBand::whole(height),
+    };
     check(problem);
 }
 

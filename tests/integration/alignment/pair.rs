@@ -12,7 +12,7 @@ use mba_tracker::image::{ColourView, DepthView, GreyPyramid, PixelFormat, PixelR
 use mba_tracker::keyframe::{Keyframe, MAX_KEYPOINTS};
 use mba_tracker::photometric::{InverseResponse, LuminanceTable};
 use mba_tracker::surface::InverseDepthMap;
-use mba_tracker::trajectory::ExposureTrajectory;
+use mba_tracker::trajectory::{ExposureTrajectory, FrameTiming};
 use mba_tracker::transfer::{BrightnessModel, PatchCost, PatchSite};
 use mba_tracker::workspace::Arena;
 use nalgebra::Vector6;
@@ -87,7 +87,13 @@ pub(crate) fn align(
             depth: &keyframe.depth,
             planes: &keyframe.planes,
         },
-        frame: FrameData { levels: &pyramid.levels, depth: &depth, depth_level: DEPTH_LEVEL, region },
+        frame: FrameData {
+            levels: &pyramid.levels,
+            depth: &depth,
+            depth_level: DEPTH_LEVEL,
+            region,
+            timing: FrameTiming::GLOBAL,
+        },
         expected_brightness: BrightnessModel::default(),
         settings,
     };
@@ -109,10 +115,11 @@ pub(crate) fn align(
 /// A belief about the motion with standard deviations in metres and radians.
 pub(crate) fn prior(expected: Vector6<f64>, metres: f64, radians: f64) -> MotionPrior {
     let information = Vector6::from_fn(|i, _| if i < 3 { metres.powi(-2) } else { radians.powi(-2) });
-    MotionPrior { expected, information }
+    let nothing = Vector6::zeros();
+    MotionPrior { expected, information, bow: nothing, bow_information: nothing, follows: None }
 }
 
 /// An estimate without gain and offset.
 pub(crate) fn estimate(keyframe_from_camera: ExposureTrajectory) -> Estimate {
-    Estimate { keyframe_from_camera, brightness: BrightnessModel::default() }
+    Estimate::linear(keyframe_from_camera)
 }

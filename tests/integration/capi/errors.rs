@@ -181,7 +181,7 @@ fn every_code_has_a_text_of_its_own() {
     // SAFETY: never null, terminated, static.
     let text = |code| unsafe { CStr::from_ptr(mba_error_string(code)) };
     let unknown = text(-1);
-    let texts: std::collections::BTreeSet<_> = (MBA_OK..=MBA_ERROR_NOT_INITIALISED).map(text).collect();
-    assert_eq!(texts.len(), 13);
-    assert!(!texts.contains(unknown) && text(13) == unknown);
+    let texts: std::collections::BTreeSet<_> = (MBA_OK..=MBA_ERROR_DEPTH_TIMESTAMP).map(text).collect();
+    assert_eq!(texts.len(), 14);
+    assert!(!texts.contains(unknown) && text(14) == unknown);
 }

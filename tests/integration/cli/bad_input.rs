@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use mba_mapper::run::Run;
 use mba_tests::small_dataset::{FRAMES, calibration};
 
 use super::{Outcome, Workplace, mba};
@@ -71,8 +72,12 @@ fn depth_that_is_all_zero_is_told_and_survived() {
     let told = info(&place);
     assert_eq!(told.code, Some(0), "{}", told.stderr);
     assert!(told.stdout.contains("8 of 8 sampled depth images hold no depth at all"), "{}", told.stdout);
-    let summary = place.track().json();
-    assert_eq!(summary["frames"]["total"], FRAMES);
+    let outcome = place.track();
+    outcome
+        .assert_error(1, &["nothing could be tracked", "8 of 8 sampled depth images hold no depth at all"]);
+    // What was tried is there to be looked at.
+    let run = Run::open(&place.path("run")).unwrap();
+    assert_eq!((run.summary.complete, run.frames.len()), (true, FRAMES));
 }
 
 #[test]
@@ -155,8 +160,19 @@ fn settings_out_of_range_are_refused() {
     };
     synth("--exposure", "2").assert_error(2, &["exposure 2", "frame interval"]);
     synth("--frames", "0").assert_error(2, &["frames 0"]);
-    for (option, value) in [("--size", "640"), ("--blur", "-1"), ("--scene", "moon"), ("--response", "cubic")]
-    {
+    synth("--readout", "-0.05").assert_error(2, &["readout -0.05", "the frame interval"]);
+    synth("--vignetting", "-1.5,0.4").assert_error(2, &["least light of the fall-off -0.1"]);
+    synth("--black", "10-90").assert_error(2, &["black frame 90", "frames of the sequence"]);
+    synth("--response", "none.csv").assert_error(2, &["cannot read none.csv"]);
+    for (option, value) in [
+        ("--size", "640"),
+        ("--blur", "-1"),
+        ("--scene", "moon"),
+        ("--response", "cubic"),
+        ("--vignetting", "-0.3"),
+        ("--saturated", "5-3"),
+        ("--jump", "-1"),
+    ] {
         let outcome = synth(option, value);
         assert_eq!(outcome.code, Some(2));
         assert!(outcome.stderr.contains(value), "{}", outcome.stderr);

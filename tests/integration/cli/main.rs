@@ -3,9 +3,15 @@
 mod bad_input;
 mod commands;
 mod eval_images;
+#[cfg(unix)]
+mod interrupts;
 mod keyframes;
+#[cfg(unix)]
+mod kills;
 mod map;
 mod mesh;
+mod outputs;
+mod real_camera;
 mod render;
 mod slam;
 

@@ -29,7 +29,7 @@ impl Shaken {
             height: 120,
             ..SynthConfig::default()
         };
-        let sequence = SynthSequence::new(config).expect("a valid configuration");
+        let sequence = SynthSequence::new(config.clone()).expect("a valid configuration");
         let mut draw = Uniform::new(seed);
         let truth: Vec<ExposureTrajectory> = (0..FRAMES).map(|k| sequence.exposure(k)).collect();
         let frames = truth.iter().enumerate().map(|(k, exposure)| {

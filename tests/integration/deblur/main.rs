@@ -8,7 +8,7 @@ use mba_tracker::deblur::{DeblurReport, DeblurScratch, blur_along};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::{level_name, levels_up_to};
 use mba_tracker::surface::{InverseDepthMap, SurfacePlanes};
-use mba_tracker::trajectory::ExposureTrajectory;
+use mba_tracker::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use mba_tracker::workspace::Arena;
 use nalgebra::Vector6;
 
@@ -66,7 +66,14 @@ fn deblur(
     let mut planes = SurfacePlanes::carve(&mut arena, &camera, 0).expect("memory");
     planes.fit(&map);
     let mut scratch = DeblurScratch::carve(&mut arena, camera.width, camera.height).expect("memory");
-    let longest = scratch.flow.fill(&exposure(motion), &camera, &planes, 0, 0.4);
+    let longest = scratch.flow.fill(
+        &BowedTrajectory::without_bow(exposure(motion)),
+        &FrameTiming::GLOBAL,
+        &camera,
+        &planes,
+        0,
+        0.4,
+    );
     scratch.capture(captured);
     let mut image = captured.to_vec();
     let report = scratch.deblur(level, longest, iterations, &mut image);

@@ -3,4 +3,5 @@
 mod field;
 mod quality;
 mod recovery;
+mod rolling;
 mod settings;

@@ -7,4 +7,5 @@ mod levels;
 mod ply;
 mod poison;
 mod reference;
+mod rolling;
 mod threads;

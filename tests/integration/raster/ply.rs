@@ -124,3 +124,22 @@ fn what_no_renderer_draws_is_not_written() {
     map.set(1, &broken);
     assert_eq!(parse(&format_ply(&map)).unwrap().len(), 2);
 }
+
+#[test]
+fn infinite_opacity_is_opaque_and_anything_else_that_is_no_number_is_named() {
+    let map = random_map(3);
+    let bytes = format_ply(&map);
+    let body = bytes.len() - 3 * 17 * 4;
+    // Position, normal and colour come before it: nine numbers.
+    let with_opacity = |value: f32| {
+        let mut bytes = bytes.clone();
+        bytes[body + 36..body + 40].copy_from_slice(&value.to_le_bytes());
+        bytes
+    };
+    let opacity = |value: f32| parse(&with_opacity(value)).unwrap().get(0).unwrap().opacity_logit;
+    let shown = |logit: f32| 1.0 / (1.0 + (-logit).exp());
+    assert_eq!(opacity(1.5), 1.5);
+    assert_eq!((shown(opacity(f32::INFINITY)), opacity(f32::NEG_INFINITY)), (1.0, -30.0));
+    let message = message(&with_opacity(f32::NAN));
+    assert!(message.contains("opacity") && message.contains("map.ply"), "{message}");
+}

@@ -3,7 +3,7 @@
 use std::fs;
 use std::time::Duration;
 
-use mba_mapper::dataset;
+use mba_mapper::dataset::{self, Dataset};
 use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::slam::SlamSettings;
 use mba_mapper::synth::{CameraMotion, DepthSensor, NoiseModel, SynthConfig};
@@ -40,8 +40,7 @@ fn a_loop_halves_the_drift_and_a_lost_tracker_finds_a_place_it_left_long_ago() {
     assert!(on.1 >= 1 && off.1 == 0);
     assert!(on.0 < 0.5 * off.0, "{} m instead of {} m", on.0, off.0);
 
-    kidnap(&sequence);
-    let data = dataset::open(&sequence.path("data")).unwrap();
+    let data = kidnapped(&sequence);
     let summary = sequence.slam_of(&data, "kidnapped", &settings(true));
     assert!(summary.slam.unwrap().relocalisations >= 1, "{:?}", summary.slam);
     let run = Run::open(&sequence.path("kidnapped")).unwrap();
@@ -50,8 +49,8 @@ fn a_loop_halves_the_drift_and_a_lost_tracker_finds_a_place_it_left_long_ago() {
     assert!(summary.trajectory.unwrap().end_drift_m < 0.005);
 }
 
-/// Leaves out the frames between a third of the way and nearly its end, where the camera began.
-fn kidnap(sequence: &BlurredSequence) {
+/// The data set without the frames between a third of the way and nearly its end, where the camera began.
+pub(crate) fn kidnapped(sequence: &BlurredSequence) -> Dataset {
     for list in ["rgb.txt", "depth.txt", "associations.txt"] {
         let path = sequence.path("data").join(list);
         let Ok(text) = fs::read_to_string(&path) else { continue };
@@ -60,4 +59,5 @@ fn kidnap(sequence: &BlurredSequence) {
         let lines: Vec<&str> = comments.iter().chain(kept).copied().collect();
         fs::write(&path, lines.join("\n") + "\n").unwrap();
     }
+    dataset::open(&sequence.path("data")).unwrap()
 }

@@ -3,4 +3,5 @@
 mod field;
 mod loops;
 mod quality;
+mod resume;
 mod stream;

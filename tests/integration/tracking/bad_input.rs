@@ -82,9 +82,11 @@ fn refused(good: &Frame, previous: f64) -> Vec<(Frame<'static>, Expected)> {
     let frame = |timestamp, exposure, colour, depth| Frame {
         timestamp,
         exposure,
+        depth_timestamp: timestamp,
         colour,
         depth,
         angular_velocity: None,
+        gyro: None,
     };
     let t = good.timestamp;
     let (c, d) = (colour(160, 120), depth(160, 120));

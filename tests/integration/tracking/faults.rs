@@ -1,7 +1,7 @@
 //! Camera faults in the middle of a sequence: no panic, the right status, and no trace afterwards.
 
 use mba_tests::handheld::{RenderedFrame, camera_of_width, pose_error, track_anew, tracker_config};
-use mba_tracker::{FrameResult, FrameStatus};
+use mba_tracker::{Doubt, FrameResult, FrameStatus};
 
 use crate::scenes::{SMALL, elsewhere};
 
@@ -92,5 +92,46 @@ fn useless_frames_at_the_start_are_skipped() {
     for (result, frame) in results.iter().zip(&frames).skip(2) {
         let (metres, _) = pose_error(result, frame, &frames[2]);
         assert!(result.status == FrameStatus::Ok && metres < 0.002, "{metres} m");
+    }
+}
+
+#[test]
+fn a_doubled_first_frame_costs_nothing() {
+    let mut frames = SMALL[..12].to_vec();
+    frames[1] = RenderedFrame { timestamp: frames[1].timestamp, ..frames[0].clone() };
+    let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+    for (result, frame) in results.iter().zip(&frames) {
+        let (metres, _) = pose_error(result, frame, &frames[0]);
+        assert_eq!(result.status, FrameStatus::Ok, "frame {}", result.index);
+        assert!(metres < 0.003, "frame {}: {metres} m", result.index);
+    }
+}
+
+#[test]
+fn a_first_frame_with_depth_of_no_sensor_is_not_the_start() {
+    let mut frames = SMALL[..8].to_vec();
+    frames[0] = frames[0].replaced(|grey| grey, |_, _| 1);
+    let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+    assert_eq!((results[0].status, results[0].doubt), (FrameStatus::Lost, Some(Doubt::NoStart)));
+    for (result, frame) in results.iter().zip(&frames).skip(1) {
+        let (metres, _) = pose_error(result, frame, &frames[1]);
+        assert_eq!(result.status, FrameStatus::Ok, "frame {}", result.index);
+        assert!(metres < 0.003, "frame {}: {metres} m", result.index);
+    }
+}
+
+#[test]
+fn six_covered_frames_cost_six_frames() {
+    let mut frames = SMALL.clone();
+    for frame in &mut frames[5..11] {
+        *frame = frame.replaced(|_| 0, |_, _| 0);
+    }
+    let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+    for (result, frame) in results.iter().zip(&frames) {
+        let covered = (5..11).contains(&result.index);
+        assert_eq!(result.doubt == Some(Doubt::Blind), covered, "frame {}", result.index);
+        assert_eq!(result.status == FrameStatus::Lost, covered, "frame {}", result.index);
+        let (metres, _) = pose_error(result, frame, &frames[0]);
+        assert!(covered || metres < 0.005, "frame {}: {metres} m", result.index);
     }
 }

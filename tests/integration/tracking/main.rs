@@ -8,6 +8,7 @@ mod noise;
 mod outside;
 mod recovery;
 mod reference_view;
+mod rolling;
 mod scenes;
 mod sequences;
 mod work;

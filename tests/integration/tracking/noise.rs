@@ -81,7 +81,15 @@ fn nonsense_never_panics() {
                 _ => None,
             };
             let exposure = draw.within(0.0, 0.5);
-            let frame = Frame { timestamp, exposure, colour, depth, angular_velocity: gyro };
+            let frame = Frame {
+                timestamp,
+                exposure,
+                depth_timestamp: timestamp,
+                colour,
+                depth,
+                angular_velocity: gyro,
+                gyro: None,
+            };
             let result = tracker.track(&frame).expect("a valid frame");
             let path = result.world_from_camera;
             assert!(path.start.is_valid() && path.end.is_valid(), "seed {seed}: {path:?}");

@@ -43,7 +43,15 @@ pub extern "C" fn mba_probe(
     let mut lost = 0;
     for k in 0..frames {
         let timestamp = f64::from(k) / 30.0;
-        let frame = Frame { timestamp, exposure: 0.01, colour, depth, angular_velocity: None };
+        let frame = Frame {
+            timestamp,
+            exposure: 0.01,
+            depth_timestamp: timestamp,
+            colour,
+            depth,
+            angular_velocity: None,
+            gyro: None,
+        };
         let tracked = tracker.track(&frame).is_ok_and(|result| result.status != FrameStatus::Lost);
         lost += i32::from(!tracked);
     }

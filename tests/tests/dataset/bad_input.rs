@@ -154,6 +154,17 @@ fn absurd_calibrations_are_named_with_line_and_value() {
             "estimated = [\"readout\", \"vignetting\"]\nframe_rate",
             "line 9: estimated = \"vignetting\", expected names of facts that have a value in this file",
         ),
+        (
+            "depth_scale = 5000",
+            "depth_scale = 0.0002",
+            "line 7: depth_scale = 0.0002, expected a positive number of raw units per metre, above 1",
+        ),
+        (
+            "frame_rate",
+            // At the edge, half a focal length out, 1 - 6 r^2 is negative.
+            "distortion = [-2.0, 0, 0, 0, 0]\nframe_rate",
+            "line 9: distortion = [-2, 0, .., 0], expected k1 k2 p1 p2 k3 of a lens that does not fold",
+        ),
         ("frame_rate", "estimated = [\"weather\"]\nframe_rate", "line 9: unknown variant `weather`"),
         ("\"global\"", "\"sideways\"", "line 11: unknown variant `sideways`, expected `global` or `rolling`"),
     ] {
@@ -220,5 +231,27 @@ fn assumptions_about_the_camera_are_reported() {
             "response is not given, \"srgb\" is assumed",
             "exposure_seconds is not given, 0.0167 s (0.5 of the frame interval) is assumed",
         ]
+    );
+}
+
+#[test]
+fn what_stands_in_for_the_list_of_pairs_is_not_passed_over() {
+    let folder = Folder::complete();
+    std::fs::remove_file(folder.path.join("associations.txt")).unwrap();
+    for list in ["rgb", "depth"] {
+        folder.write(&format!("{list}.txt"), &format!("0 {list}/0.png\n"));
+    }
+    assert_eq!(folder.open().len(), 1);
+    std::fs::create_dir(folder.path.join("associations.txt")).unwrap();
+    assert_eq!(folder.message(), "cannot read associations.txt: it is a folder, not a file");
+}
+
+#[test]
+fn times_that_results_could_not_tell_apart_are_refused() {
+    let folder = Folder::complete();
+    folder.edit("associations.txt", "0.033333 rgb", "0.0000004 rgb");
+    assert_eq!(
+        folder.message(),
+        "associations.txt, line 2: timestamp 0.0000004 occurs twice; remove one of the lines"
     );
 }

@@ -77,7 +77,7 @@ fn replica_messages_name_file_line_and_value() {
     folder.write("cam_params.json", &CAMERA.replace("6553.5", "0"));
     assert_eq!(
         folder.message(),
-        "cam_params.json, line 6: scale = 0, expected a positive number of raw units per metre"
+        "cam_params.json, line 6: scale = 0, expected a positive number of raw units per metre, above 1 and at most 1000000 (millimetres are 1000)"
     );
     folder.write("cam_params.json", &CAMERA.replace("\"fx\"", "\"f\""));
     assert_eq!(folder.message(), "cam_params.json, line 7: missing field `fx`");

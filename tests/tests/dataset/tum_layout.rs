@@ -3,7 +3,7 @@
 use std::fs;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
-use mba_mapper::dataset::{self, ExposureSource, OpenOptions, Readout, Response};
+use mba_mapper::dataset::{self, ExposureSource, OpenOptions, Readout, Response, TimedPose};
 
 use crate::folder::{Folder, HEIGHT, WIDTH, colour_image};
 
@@ -213,8 +213,17 @@ fn ground_truth_need_not_match_the_frames() {
 
     folder.write("groundtruth.txt", "100 0 0 0 0 0 0 1\n");
     assert_eq!(folder.warnings(), ["groundtruth.txt covers none of the frames' times"]);
-    folder.write("groundtruth.txt", "0 0 0 0 1 1 0 0\n");
-    assert!(folder.message().starts_with("groundtruth.txt, line 1: the quaternion has length 1.4142"));
+    // Lines that are no poses are left out, also where the times do not increase over them.
+    folder.write(
+        "groundtruth.txt",
+        "0 0 0 0 1 1 0 0\n0.01 1 0 0 0 0 0 1\n0.01 2 0 0 0 0 0 1\n0.02 nan 0 0 0 0 0 1\n0.03 3 0 0\n0.04 4 0 0 0 0 0 1\n",
+    );
+    let [warning] = <[String; 1]>::try_from(folder.warnings()).unwrap();
+    let expected =
+        "4 lines of recorded poses are left out, the first because groundtruth.txt, line 1: the quaternion";
+    assert!(warning.starts_with(expected), "{warning}");
+    let x = |pose: &TimedPose| pose.world_from_camera.translation.x;
+    assert_eq!(folder.open().ground_truth().iter().map(x).collect::<Vec<_>>(), [1.0, 4.0]);
 
     fs::remove_file(folder.path.join("groundtruth.txt")).unwrap();
     let pose = |x: u8| format!("{x} 0 0 0 0 0 1");

@@ -300,13 +300,13 @@ impl Objective<'_> {
     fn add_priors(&self, estimate: &Estimate, result: &mut Linearised) {
         let [motion, bow] = self.prior.residuals(&estimate.keyframe_from_camera, &estimate.bow);
         let (of_motion, of_bow) =
-            self.prior.follows.map_or((0.0, 0.0), |follows| (follows.motion, follows.bow));
+            self.prior.follows.map_or(([0.0; 2], [0.0; 2]), |follows| (follows.motion, follows.bow));
         for i in 0..6 {
-            result.add_tie([i, 6 + i], of_motion, self.prior.information[i], motion[i]);
+            result.add_tie([i, 6 + i], of_motion[i / 3], self.prior.information[i], motion[i]);
         }
         for i in 0..6 {
             if self.frame.timing.reaches_outside() {
-                result.add_tie([i, UNKNOWNS + i], of_bow, self.prior.bow_information[i], bow[i]);
+                result.add_tie([i, UNKNOWNS + i], of_bow[i / 3], self.prior.bow_information[i], bow[i]);
             } else {
                 // Not an unknown: it stays where it is.
                 result.hessian[(UNKNOWNS + i, UNKNOWNS + i)] = 1.0;

@@ -32,10 +32,10 @@ pub struct MotionPrior {
 pub struct FollowsCentre {
     /// The mid pose for which the expected values hold.
     pub keyframe_from_mid: RigidTransform,
-    /// Change of the expected motion per change of the mid pose.
-    pub motion: f64,
-    /// Change of the expected bow per change of the mid pose.
-    pub bow: f64,
+    /// Change of the expected motion per change of the mid pose, of translation and rotation.
+    pub motion: [f64; 2],
+    /// Change of the expected bow per change of the mid pose, of translation and rotation.
+    pub bow: [f64; 2],
 }
 
 impl MotionPrior {
@@ -45,8 +45,10 @@ impl MotionPrior {
         let mut residuals = [trajectory.motion() - self.expected, bow - self.bow];
         if let Some(follows) = &self.follows {
             let centre = follows.keyframe_from_mid.tangent_to(&trajectory.mid());
-            residuals[0] -= centre * follows.motion;
-            residuals[1] -= centre * follows.bow;
+            for i in 0..6 {
+                residuals[0][i] -= centre[i] * follows.motion[i / 3];
+                residuals[1][i] -= centre[i] * follows.bow[i / 3];
+            }
         }
         residuals
     }

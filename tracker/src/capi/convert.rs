@@ -148,6 +148,7 @@ pub(super) unsafe fn frame<'a>(frame: &MbaFrame) -> Result<Frame<'a>, i32> {
         colour,
         depth,
         angular_velocity,
+        gyro: None,
     })
 }
 

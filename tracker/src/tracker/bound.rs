@@ -1,14 +1,15 @@
 //! The most that a frame can take.
 
+use super::bootstrap::BOOTSTRAP_ROUNDS;
 use super::coarse_to_fine::{COMPETING_LEVELS, COMPETING_STRIDE, FINALISTS, FINE_STRIDE, MAX_GUESSES};
 use super::config::{ReferenceMode, TrackerConfig};
 use crate::keyframe::max_keypoints;
 use crate::transfer::MAX_VIRTUAL_VIEWS;
 use crate::work::Work;
 
-/// Alignments from all guesses: a second frame that is not found with its keyframe as captured, or is found and not
-/// confirmed, is looked for among earlier keyframes and aligned once more.
-const FULL_ALIGNMENTS: u64 = 2;
+/// Alignments from all guesses: a frame that fits badly is tried once more as if nothing were known of its motion, and one
+/// that is still not found is looked for among earlier keyframes and aligned again.
+const FULL_ALIGNMENTS: u64 = 3;
 
 /// First guesses from which an earlier keyframe is tried.
 const RECOVERY_GUESSES: usize = 2;
@@ -24,13 +25,17 @@ impl TrackerConfig {
     pub fn work_bound(&self) -> Work {
         let pixels = (self.camera.width * self.camera.height) as u64;
         let mut bound = self.alignment_bound(0, MAX_GUESSES).times(FULL_ALIGNMENTS);
-        bound += self.alignment_bound(0, 1);
+        let apart = self.readout.colour_rolls() || self.readout.depth_is_apart();
+        // The second frame, and where rows or depth are apart each of the first two with the other in turn.
+        let exchanges = if apart { 2 * BOOTSTRAP_ROUNDS as u64 } else { 0 };
+        bound += self.alignment_bound(0, 1).times(1 + exchanges);
         let recovery = self.alignment_bound(self.surface_level, RECOVERY_GUESSES);
         bound += recovery.times(self.recent_keyframes as u64);
-        bound.image_pixels = pixels * (1 + DEBLURRINGS);
+        let deblurrings = DEBLURRINGS + exchanges;
+        bound.image_pixels = pixels * (1 + deblurrings);
         if self.reference == ReferenceMode::Deblurred {
             let blurs = (self.deblur_iterations as u64).saturating_mul(2).saturating_add(1);
-            bound.blur_taps = blurs.saturating_mul(DEBLURRINGS * MAX_VIRTUAL_VIEWS as u64 * pixels);
+            bound.blur_taps = blurs.saturating_mul(deblurrings * MAX_VIRTUAL_VIEWS as u64 * pixels);
         }
         bound
     }
@@ -76,16 +81,16 @@ mod tests {
     #[test]
     fn bound_is_the_product_of_its_factors() {
         let config = TrackerConfig::compact(CAMERA, 0.001, InverseResponse::linear());
-        // Keypoints: 7x5 cells on level 0, 6x5 on level 1, 5x4 on level 2. Linearisations: twice 12, 8 and 1 starts
-        // of 8 on levels 2, 1 and 0, once 1, 1 and 1; each with two predictions of every patch.
-        let patches = 2 * 8 * (2 * (12 * 20 + 8 * 30 + 35) + 20 + 30 + 35);
+        // Keypoints: 7x5 cells on level 0, 6x5 on level 1, 5x4 on level 2. Linearisations: three times 12, 8 and 1
+        // starts of 8 on levels 2, 1 and 0, once 1, 1 and 1; each with two predictions of every patch.
+        let patches = 2 * 8 * (3 * (12 * 20 + 8 * 30 + 35) + 20 + 30 + 35);
         // The map of 80x60 with every fourth point and, for the noise, every eighth; second and fourth on level 0.
         let (coarse, fine) = (20 * 15 + 10 * 8, 40 * 30 + 20 * 15);
         let expected = Work {
-            linearisations: 8 * (2 * (12 + 8 + 1) + 3),
+            linearisations: 8 * (3 * (12 + 8 + 1) + 3),
             patches,
             view_pixels: patches * 32 * 32,
-            depth_points: 8 * (2 * (20 * coarse + fine) + 2 * coarse + fine),
+            depth_points: 8 * (3 * (20 * coarse + fine) + 2 * coarse + fine),
             blur_taps: 0,
             image_pixels: 3 * 160 * 120,
         };

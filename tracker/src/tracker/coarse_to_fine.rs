@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 use nalgebra::{Vector3, Vector6};
 
+use super::frame::GyroReading;
 use super::history::Motion;
 use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, MotionPrior};
 use crate::geometry::RigidTransform;
@@ -44,6 +45,8 @@ pub(super) struct FrameTask<'a> {
     pub(super) span: f64,
     /// Angular velocity since the last frame, camera frame, rad/s.
     pub(super) gyro: Option<Vector3<f64>>,
+    /// Turning around mid exposure, without bias.
+    pub(super) turning: Option<GyroReading>,
     pub(super) brightness: BrightnessModel,
     /// Whether the motion during the exposure is sampled.
     pub(super) blur: bool,
@@ -198,6 +201,10 @@ impl FrameTask<'_> {
             self.inverse_depth,
         );
         // Without rows or depth at other times the mid pose is measured by itself.
+        let prior = match &self.turning {
+            Some(turning) => Motion::with_gyro(prior, turning, self.span),
+            None => prior,
+        };
         let follows = prior.follows.filter(|_| self.alignment.frame.timing.reaches_outside());
         MotionPrior { follows, ..prior }
     }

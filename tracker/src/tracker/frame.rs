@@ -21,6 +21,17 @@ pub struct Frame<'a> {
     pub depth: DepthView<'a>,
     /// Mean angular velocity between the frame before and this one, camera frame, rad/s, if a gyroscope is at hand.
     pub angular_velocity: Option<Vector3<f64>>,
+    /// What a gyroscope says of the turning around mid exposure, if one is at hand.
+    pub gyro: Option<GyroReading>,
+}
+
+/// How the camera turns around mid exposure (of the middle row), as measured by a gyroscope; its bias may still be in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GyroReading {
+    /// Angular velocity, camera frame, rad/s.
+    pub angular_velocity: Vector3<f64>,
+    /// Angular acceleration, camera frame, rad/s^2.
+    pub angular_acceleration: Vector3<f64>,
 }
 
 /// A sharp view from outside, for example rendered from a map.

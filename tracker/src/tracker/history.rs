@@ -2,6 +2,7 @@
 
 use nalgebra::Vector6;
 
+use super::frame::GyroReading;
 use crate::align::{FollowsCentre, MotionPrior};
 use crate::geometry::{PinholeCamera, RigidTransform};
 
@@ -16,6 +17,8 @@ pub(super) struct Motion {
     pub(super) between_frames: Vector6<f64>,
     /// Time since the frame before, seconds; infinite while there is none.
     pub(super) interval: f64,
+    /// Exposure time, seconds.
+    pub(super) exposure: f64,
     /// Motion during the exposure; `None` while it is unknown.
     pub(super) within_exposure: Option<Vector6<f64>>,
     /// Acceleration during the exposure, per square second; zero where it is not estimated.
@@ -35,6 +38,14 @@ const BOW_FLOOR: f64 = 4.0;
 const MAX_ACCELERATION: f64 = 100.0;
 const MAX_ANGULAR_ACCELERATION: f64 = 500.0;
 
+/// Standard deviations of a gyroscope's rate: what is left of its bias and noise, rad/s, and a share of the rate for its
+/// scale and its time.
+const GYRO_SIGMA: f64 = 0.05;
+const GYRO_SCALE_SIGMA: f64 = 0.05;
+
+/// Share of the parabola that samples of a gyroscope at both ends leave open.
+const GYRO_BOW_SHARE: f64 = 0.3;
+
 /// How far the motion within an exposure may correct the velocity that the mid poses around it give, as a share of the
 /// change of the mean velocity between them.
 const EXPOSURE_TRUST: f64 = 0.5;
@@ -47,6 +58,7 @@ impl Motion {
             reference_from_mid,
             between_frames: Vector6::zeros(),
             interval: f64::INFINITY,
+            exposure: 0.0,
             within_exposure: None,
             acceleration: Vector6::zeros(),
         }
@@ -129,10 +141,29 @@ impl Motion {
             bow_information: information(&bow_spread, BOW_FLOOR),
             follows: (dt <= MAX_GAP).then_some(FollowsCentre {
                 keyframe_from_mid: *reference_from_mid,
-                motion: motion_follows,
-                bow: bow_follows,
+                motion: [motion_follows; 2],
+                bow: [bow_follows; 2],
             }),
         }
+    }
+
+    /// The belief of [`Self::expected_motion`] with the turning as a gyroscope measured it, without its bias: that owes
+    /// nothing to the picture, so it does not follow the mid pose.
+    pub(super) fn with_gyro(mut prior: MotionPrior, gyro: &GyroReading, span: f64) -> MotionPrior {
+        let turn = gyro.angular_velocity * span;
+        let bow = gyro.angular_acceleration * (0.5 * span * span);
+        let sigma = GYRO_SIGMA * span + GYRO_SCALE_SIGMA * turn.norm();
+        let bow_sigma = GYRO_BOW_SHARE * bow.norm() + GYRO_SIGMA * span;
+        for i in 0..3 {
+            prior.expected[3 + i] = turn[i];
+            prior.information[3 + i] = 1.0 / (sigma * sigma);
+            prior.bow[3 + i] = bow[i];
+            prior.bow_information[3 + i] = 1.0 / (bow_sigma * bow_sigma);
+        }
+        if let Some(follows) = &mut prior.follows {
+            (follows.motion[1], follows.bow[1]) = (0.0, 0.0);
+        }
+        prior
     }
 
     /// Velocity at the last frame, given the mean rate from it to the next, `dt` seconds later, and what its own exposure
@@ -206,6 +237,51 @@ mod tests {
         let mid = other.compose(&pose(0.2 + DT));
         let there = motion(0.2).seen_from(&other).expected_motion(&mid, 0.2 + DT, 0.015, &CAMERA, 0.5);
         assert!((rotated(&other, &here.expected) - there.expected).norm() < 1e-12);
+    }
+
+    #[test]
+    fn a_wrong_exposure_motion_dies_out_within_three_frames() {
+        // Constant velocity. A blurred picture accepts whatever it is told with either sign: what is expected is measured.
+        let rate = Vector6::new(0.3, -0.1, 0.2, 0.1, -0.4, 0.2);
+        let pose = |k: usize| RigidTransform::identity().perturbed(&(rate * (k as f64 * DT)));
+        let wrong = rate * 4.0;
+        let mut motion = Motion {
+            between_frames: rate,
+            interval: DT,
+            within_exposure: Some(wrong),
+            ..Motion::still(0.0, pose(0))
+        };
+        for k in 1..4 {
+            let time = k as f64 * DT;
+            // Mid poses with an error of a tenth of a millimetre to and fro, which the limit is taken from.
+            let mid = pose(k).perturbed(&Vector6::repeat(1e-4 * if k % 2 == 0 { 1.0 } else { -1.0 }));
+            let expected = motion.expected_motion(&mid, time, 1.0, &CAMERA, 0.5).expected;
+            motion = Motion {
+                between_frames: motion.reference_from_mid.tangent_to(&mid) / DT,
+                within_exposure: Some(expected),
+                timestamp: time,
+                reference_from_mid: mid,
+                ..motion
+            };
+        }
+        let error = (motion.within_exposure.expect("a motion") - rate).norm() / rate.norm();
+        let before = (wrong - rate).norm() / rate.norm();
+        assert!(before > 2.9 && error < 0.1, "{error} of the motion is left of {before}");
+    }
+
+    #[test]
+    fn a_gyroscope_replaces_the_turn_and_nothing_else() {
+        let prior = motion(0.2).expected_motion(&pose(0.2 + DT), 0.2 + DT, 0.02, &CAMERA, 0.5);
+        let gyro = GyroReading {
+            angular_velocity: nalgebra::Vector3::new(0.3, -0.2, 0.1),
+            angular_acceleration: nalgebra::Vector3::new(10.0, 0.0, -5.0),
+        };
+        let told = Motion::with_gyro(prior, &gyro, 0.02);
+        assert_eq!(told.expected.fixed_rows::<3>(0), prior.expected.fixed_rows::<3>(0));
+        assert_eq!(told.expected.fixed_rows::<3>(3), gyro.angular_velocity * 0.02);
+        // Half of the acceleration times the square of the span.
+        assert_eq!(told.bow.fixed_rows::<3>(3), gyro.angular_acceleration * 2e-4);
+        assert_eq!(told.follows.map(|follows| (follows.motion[1], follows.bow[1])), Some((0.0, 0.0)));
     }
 
     #[test]

@@ -1,20 +1,23 @@
 //! The tracker: frames in, poses at shutter opening and closing out.
 
+mod bootstrap;
 mod bound;
 mod coarse_to_fine;
 mod config;
 mod frame;
+mod hindsight;
 mod history;
 mod keyframe_path;
 mod outside;
 mod policy;
 mod recovery;
+mod reference;
 mod result;
 mod track;
 
 pub use config::{
     Effort, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len,
 };
-pub use frame::{Frame, ReferenceView};
-pub use result::{FrameResult, FrameStatus, Revision};
+pub use frame::{Frame, GyroReading, ReferenceView};
+pub use result::{Doubt, FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

@@ -1,6 +1,6 @@
 //! When a frame is trusted and when it becomes the keyframe.
 
-use super::result::FrameStatus;
+use super::result::{Doubt, FrameStatus};
 use crate::align::{LevelOutcome, StopReason};
 
 /// What an alignment ended with, in the terms of the decisions.
@@ -34,40 +34,87 @@ pub(super) struct Typical {
 impl Typical {
     /// Takes in a good frame.
     pub(super) fn learn(&mut self, outcome: &LevelOutcome) {
+        if outcome.photometric_scale < COPY {
+            return;
+        }
         let share = if self.residual == 0.0 { 1.0 } else { 0.2 };
         self.residual += share * (outcome.photometric_scale - self.residual);
         self.depth_residual += share * (outcome.depth_scale - self.depth_residual);
     }
 }
 
+/// Photometric residual of a frame that is a copy of its reference, nominal standard deviations: it tells nothing about
+/// how well others can fit.
+const COPY: f32 = 0.06;
+
 /// Speeds beyond which a hand-held or flying camera's pose is a mistake.
 const MAX_SPEED: f64 = 8.0;
 const MAX_ANGULAR_SPEED: f64 = 15.0;
 
-/// How far the pose can be trusted.
-pub(super) fn judge(outcome: &LevelOutcome, evidence: &Evidence, typical: &Typical) -> FrameStatus {
+/// Bounds of the brightness relative to the reference: what exposure control changes while a keyframe is in view, with a
+/// factor of two to spare.
+const GAIN_RANGE: core::ops::Range<f32> = 0.12..8.0;
+
+/// Residuals below these are never bad, whatever was usual before: a frame that is compared with its own copy, or with one
+/// without noise, fits better than any other ever will. Nominal standard deviations, and 1/m.
+const RESIDUAL_FLOOR: f32 = 0.5;
+const DEPTH_RESIDUAL_FLOOR: f32 = 5e-4;
+
+/// How far the pose can be trusted, and why no further.
+pub(super) fn judge(
+    outcome: &LevelOutcome,
+    evidence: &Evidence,
+    typical: &Typical,
+) -> (FrameStatus, Option<Doubt>) {
+    let lost = |doubt| (FrameStatus::Lost, Some(doubt));
+    let weak = |doubt| (FrameStatus::Weak, Some(doubt));
     let aligned = !matches!(outcome.stop, StopReason::NoData | StopReason::Singular);
-    let plausible = evidence.speed < MAX_SPEED && evidence.angular_speed < MAX_ANGULAR_SPEED;
     let measured = evidence.inliers > 0.08 || outcome.depth_points > 300;
-    if !(aligned && plausible && measured) {
-        return FrameStatus::Lost;
+    if !(aligned && measured) {
+        return lost(Doubt::NoMatch);
     }
-    let residual = ratio(outcome.photometric_scale, typical.residual);
-    let depth_residual = ratio(outcome.depth_scale, typical.depth_residual);
+    if !(evidence.speed < MAX_SPEED && evidence.angular_speed < MAX_ANGULAR_SPEED) {
+        return lost(Doubt::Speed);
+    }
+    if !GAIN_RANGE.contains(&outcome.estimate.brightness.gain) {
+        return lost(Doubt::Brightness);
+    }
+    let residual = ratio(outcome.photometric_scale, typical.residual, RESIDUAL_FLOOR);
+    let depth_residual = ratio(outcome.depth_scale, typical.depth_residual, DEPTH_RESIDUAL_FLOOR);
     let depth_agrees = outcome.depth_points > 300 && depth_residual < 3.0;
     if residual > 4.0 && !depth_agrees {
-        return FrameStatus::Lost;
+        return lost(Doubt::Residual);
     }
-    if residual > 2.5 || evidence.inliers < 0.2 { FrameStatus::Weak } else { FrameStatus::Ok }
+    if residual > 2.5 {
+        return weak(Doubt::Residual);
+    }
+    if evidence.inliers < 0.2 { weak(Doubt::Inliers) } else { (FrameStatus::Ok, None) }
 }
+
+/// Whether an image shows nothing that could be aligned: its coarsest level is as flat as a lens cap or a light.
+pub(super) fn is_blind(coarsest: &[f32]) -> bool {
+    let count = coarsest.len().max(1) as f32;
+    let mean = coarsest.iter().sum::<f32>() / count;
+    let variance = coarsest.iter().map(|light| (light - mean) * (light - mean)).sum::<f32>() / count;
+    // Half a step of an 8-bit image near black, and of one near white.
+    let (dark, bright) = (mean < BLACK, mean > WHITE);
+    (dark || bright) && variance < FLAT * FLAT
+}
+
+/// Mean light below which an image is that of a covered lens, and above which it is saturated; and the standard deviation
+/// of the coarsest level from which it shows something after all.
+const BLACK: f32 = 2e-3;
+const WHITE: f32 = 0.97;
+const FLAT: f32 = 2e-3;
 
 /// Whether an alignment fits so much worse than usual that another try from other guesses is worth its time.
 pub(super) fn fits_badly(outcome: &LevelOutcome, typical: &Typical) -> bool {
-    ratio(outcome.photometric_scale, typical.residual) > 2.0
+    ratio(outcome.photometric_scale, typical.residual, RESIDUAL_FLOOR) > 2.0
 }
 
-fn ratio(value: f32, typical: f32) -> f32 {
-    if typical > 0.0 { value / typical } else { 1.0 }
+/// A value relative to what is usual, which is `floor` at the least; 1 while nothing is usual.
+fn ratio(value: f32, typical: f32, floor: f32) -> f32 {
+    if typical > 0.0 { value / typical.max(floor) } else { 1.0 }
 }
 
 /// Whether the frame should replace a keyframe that was blurred by `keyframe_blur` pixels.
@@ -88,4 +135,25 @@ pub(super) fn wants_keyframe(
     let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(if rolling { 0.012 } else { 0.006 } * width);
     let leaving = evidence.overlap < 0.45 || evidence.flow > 0.3 * width;
     usable && (much_sharper || (far && as_sharp) || leaving)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn covered_and_saturated_images_are_blind_and_dim_ones_are_not() {
+        assert!(is_blind(&[0.0; 64]));
+        assert!(is_blind(&[1.0; 64]));
+        let dim: [f32; 64] = core::array::from_fn(|k| 0.001 + 0.006 * (k % 2) as f32);
+        assert!(!is_blind(&dim));
+        assert!(!is_blind(&[0.5; 64]), "a grey wall has depth");
+    }
+
+    #[test]
+    fn residuals_below_the_floor_are_never_bad() {
+        let values =
+            [ratio(0.45, 0.05, RESIDUAL_FLOOR), ratio(3.0, 1.0, RESIDUAL_FLOOR), ratio(9.0, 0.0, 1.0)];
+        assert_eq!(values, [0.9, 3.0, 1.0]);
+    }
 }

@@ -105,6 +105,7 @@ impl<'m> RecentKeyframes<'m> {
                 timestamp,
                 span: 0.0,
                 gyro: None,
+                turning: None,
                 brightness: BrightnessModel::default(),
                 blur: false,
                 inverse_depth: typical_inverse_depth(finest),

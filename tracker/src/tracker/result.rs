@@ -31,6 +31,44 @@ impl FrameStatus {
     }
 }
 
+/// Why a frame is weak or lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Doubt {
+    /// The image shows nothing: it is black, saturated or covered.
+    Blind,
+    /// Nothing to start from: too little depth, depth out of any sensor's range, or no texture.
+    NoStart,
+    /// Nothing of the reference was found.
+    NoMatch,
+    /// The camera would have moved faster than any hand.
+    Speed,
+    /// The brightness would have changed more than any exposure control changes it.
+    Brightness,
+    /// Few of the reference's patches are in view and agree.
+    Inliers,
+    /// Picture and depth fit much worse than usual.
+    Residual,
+    /// Found again near an earlier keyframe; the motion is not known yet.
+    FoundAgain,
+}
+
+impl Doubt {
+    /// The reason in one or two words, as in tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Blind => "blind",
+            Self::NoStart => "no start",
+            Self::NoMatch => "no match",
+            Self::Speed => "speed",
+            Self::Brightness => "brightness",
+            Self::Inliers => "inliers",
+            Self::Residual => "residual",
+            Self::FoundAgain => "found again",
+        }
+    }
+}
+
 /// A better estimate of an earlier frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Revision {
@@ -53,6 +91,8 @@ pub struct FrameResult {
     pub timestamp: f64,
     /// How far the poses can be trusted.
     pub status: FrameStatus,
+    /// Why no further; `None` for a frame that is ok.
+    pub doubt: Option<Doubt>,
     /// `world_from_camera` at shutter opening and closing of the middle row; the world is the first frame's camera at mid
     /// exposure.
     pub world_from_camera: ExposureTrajectory,
@@ -85,7 +125,7 @@ pub struct FrameResult {
     /// Running number of the frame that it was aligned with.
     pub reference_index: usize,
     /// What this frame taught about an earlier one: the motion of the very first frame is known only after the
-    /// second.
+    /// second, and whether a shutter was open for the motion that a picture seems to show only after the next.
     pub revision: Option<Revision>,
 }
 
@@ -101,6 +141,7 @@ impl FrameResult {
             index,
             timestamp,
             status: FrameStatus::Lost,
+            doubt: Some(Doubt::NoMatch),
             world_from_mid: world_from_camera.mid(),
             world_from_camera,
             information: outcome.information,

@@ -1,24 +1,22 @@
 //! The tracking loop.
 
-use core::mem;
-
 use fearless_simd::Level;
-use nalgebra::Vector6;
+use nalgebra::Vector3;
 
 use super::coarse_to_fine::{Aligned, FrameTask, score};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
-use super::frame::Frame;
-use super::history::{Motion, rotated};
+use super::frame::{Frame, GyroReading};
+use super::history::Motion;
 use super::keyframe_path::{PathError, PathRate};
-use super::policy::{Evidence, Typical, fits_badly, judge, wants_keyframe};
+use super::policy::{Evidence, Typical, fits_badly, is_blind, judge, wants_keyframe};
 use super::recovery::RecentKeyframes;
-use super::result::{FrameResult, FrameStatus, Revision};
+use super::result::{Doubt, FrameResult, FrameStatus, Revision};
 use crate::align::{AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, ReferenceData, blur_length};
 use crate::deblur::DeblurScratch;
 use crate::error::{ConfigError, FrameError};
-use crate::geometry::RigidTransform;
+use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::GreyPyramid;
-use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch, typical_inverse_depth};
+use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch, max_keypoints, typical_inverse_depth};
 use crate::photometric::LuminanceTable;
 use crate::surface::InverseDepthMap;
 use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
@@ -26,28 +24,25 @@ use crate::transfer::BrightnessModel;
 use crate::work::Work;
 use crate::workspace::Arena;
 
-/// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
-const MIN_STRENGTH: f32 = 0.02;
-
 /// Fewest keypoints on the finest level, and least share of measured depth, to start from.
 const MIN_START_KEYPOINTS: usize = 24;
 const MIN_START_DEPTH: f32 = 0.1;
 
+/// Share of a frame in the running mean of the gyroscope's bias: it changes over minutes.
+const GYRO_BIAS_SHARE: f64 = 0.05;
+
+/// Inverse depth, 1/m, that a first frame can have on average: 5 cm to 100 m.
+const START_INVERSE_DEPTH: core::ops::Range<f32> = 0.01..20.0;
+
+/// Frames that may be lost right after a start until the next one starts anew: a start that nothing agrees with was one
+/// with damaged depth.
+const MAX_LOST_AT_START: usize = 2;
+
 /// Largest time between a colour image and its depth image, seconds.
 const MAX_DEPTH_OFFSET: f64 = 0.2;
 
-/// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
-const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
-
-/// Standard deviation of a keyframe's velocity and of one between mid poses, as a shear in pixels over the path of a frame.
-const KEYFRAME_SHEAR: f64 = 2.0;
-const MID_POSE_SHEAR: f64 = 0.3;
-
-/// Alignments of the second frame with a first one whose own shear becomes known by them.
-const BOOTSTRAP_ROUNDS: usize = 2;
-
 /// The linear motion during the exposure of the middle row.
-fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajectory {
+pub(super) fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajectory {
     if timing.reaches_outside() {
         path.between(0.5 - 0.5 * timing.exposure, 0.5 + 0.5 * timing.exposure)
     } else {
@@ -58,32 +53,43 @@ fn exposure_of(path: &BowedTrajectory, timing: &FrameTiming) -> ExposureTrajecto
 /// Estimates camera poses at shutter opening and closing, frame by frame.
 #[derive(Debug)]
 pub struct Tracker<'m> {
-    simd: Level,
+    pub(super) simd: Level,
     pub(super) config: TrackerConfig,
     pub(super) luminance: LuminanceTable,
-    pyramid: GreyPyramid<'m>,
-    depth: InverseDepthMap<'m>,
-    depth_share: f32,
+    pub(super) pyramid: GreyPyramid<'m>,
+    pub(super) depth: InverseDepthMap<'m>,
+    pub(super) depth_share: f32,
     pub(super) keyframe: Keyframe<'m>,
     pub(super) recent: RecentKeyframes<'m>,
-    scratch: AlignScratch<'m>,
-    deblur: DeblurScratch<'m>,
-    rectify: RectifyScratch<'m>,
+    pub(super) scratch: AlignScratch<'m>,
+    pub(super) deblur: DeblurScratch<'m>,
+    pub(super) rectify: RectifyScratch<'m>,
     /// When the parts of the current frame were measured, along a path of `span` seconds.
-    timing: FrameTiming,
-    span: f64,
+    pub(super) timing: FrameTiming,
+    pub(super) span: f64,
     /// Seconds that the path of the keyframe's frame spans.
-    keyframe_span: f64,
+    pub(super) keyframe_span: f64,
+    /// What the gyroscope said while the keyframe was exposed.
+    pub(super) keyframe_gyro: Option<GyroReading>,
+    pub(super) gyro: Option<GyroReading>,
+    /// What the gyroscope says of a camera at rest, rad/s: the running mean of its difference to the poses.
+    pub(super) gyro_bias: Vector3<f64>,
+    /// Running number of the last frame that was aligned, and what the next one taught about it.
+    pub(super) last_index: usize,
+    pub(super) late_revision: Option<Revision>,
+    /// Whether any frame was aligned since the start, and how many were lost before.
+    pub(super) established: bool,
+    pub(super) lost_at_start: usize,
     /// What is known about the error of the keyframe's path.
-    path_error: PathError,
+    pub(super) path_error: PathError,
     /// Motion in the world; `None` before the first usable frame.
     pub(super) motion: Option<Motion>,
     pub(super) brightness: BrightnessModel,
-    typical: Typical,
+    pub(super) typical: Typical,
     pub(super) last_timestamp: f64,
     pub(super) frames: usize,
     /// What the current frame took so far.
-    work: Work,
+    pub(super) work: Work,
 }
 
 impl<'m> Tracker<'m> {
@@ -129,6 +135,13 @@ impl<'m> Tracker<'m> {
             timing: FrameTiming::GLOBAL,
             span: 0.0,
             keyframe_span: 0.0,
+            keyframe_gyro: None,
+            gyro: None,
+            gyro_bias: Vector3::zeros(),
+            last_index: 0,
+            late_revision: None,
+            established: false,
+            lost_at_start: 0,
             path_error: PathError::unknown(&PathRate::repeat(1.0)),
             config: config.clone(),
             motion: None,
@@ -150,7 +163,11 @@ impl<'m> Tracker<'m> {
         self.pyramid.fill(&frame.colour, &self.luminance);
         self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
         (self.timing, self.span) = self.config.readout.timing(frame);
+        self.gyro = frame.gyro;
+        let blind = self.pyramid.levels.last().is_some_and(|coarsest| is_blind(coarsest.pixels));
         let mut result = match self.motion {
+            Some(motion) if blind => self.hold(frame, &motion, &self.nothing(&motion), Doubt::Blind),
+            None if blind => self.unstarted(frame, Doubt::Blind),
             None => self.start(frame),
             Some(motion) => self.follow(frame, &motion),
         };
@@ -161,7 +178,7 @@ impl<'m> Tracker<'m> {
         Ok(result)
     }
 
-    fn pixels(&self) -> u64 {
+    pub(super) fn pixels(&self) -> u64 {
         (self.config.camera.width * self.config.camera.height) as u64
     }
 
@@ -173,6 +190,12 @@ impl<'m> Tracker<'m> {
         self.typical = Typical::default();
         self.last_timestamp = f64::NEG_INFINITY;
         self.frames = 0;
+        self.last_index = 0;
+        self.late_revision = None;
+        self.established = false;
+        self.lost_at_start = 0;
+        self.gyro_bias = Vector3::zeros();
+        self.keyframe_gyro = None;
     }
 
     fn check(&self, frame: &Frame) -> Result<(), FrameError> {
@@ -181,7 +204,8 @@ impl<'m> Tracker<'m> {
             return Err(FrameError::Exposure { got: frame.exposure });
         }
         let apart = frame.depth_timestamp - frame.timestamp;
-        if self.config.readout.depth_apart && !(apart.abs() <= MAX_DEPTH_OFFSET) {
+        let belongs = apart.abs() <= MAX_DEPTH_OFFSET;
+        if self.config.readout.depth_apart && !belongs {
             return Err(FrameError::DepthTimestamp { frame: frame.timestamp, got: frame.depth_timestamp });
         }
         if !(frame.timestamp.is_finite() && frame.timestamp > self.last_timestamp) {
@@ -205,14 +229,35 @@ impl<'m> Tracker<'m> {
         let nothing = LevelOutcome::unchanged(Estimate::linear(still));
         let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.promote(&origin, None, f32::MAX);
-        let enough = self.keyframe.finest_keypoints().len() >= MIN_START_KEYPOINTS;
-        if enough && self.depth_share >= MIN_START_DEPTH {
+        let PinholeCamera { width, height, .. } = self.config.camera;
+        // Small images have fewer cells than that; a third of them must show something.
+        let needed = MIN_START_KEYPOINTS.min(max_keypoints(width, height, 0) / 3);
+        let enough = self.keyframe.finest_keypoints().len() >= needed;
+        let in_range = self.keyframe.depth.mean().is_some_and(|rho| START_INVERSE_DEPTH.contains(&rho));
+        result.doubt = Some(Doubt::NoStart);
+        if enough && in_range && self.depth_share >= MIN_START_DEPTH {
             self.motion = Some(Motion::still(frame.timestamp, origin));
+            self.established = false;
+            self.lost_at_start = 0;
             result.status = FrameStatus::Ok;
+            result.doubt = None;
             result.inliers = 1.0;
             result.is_keyframe = true;
         }
         result
+    }
+
+    /// The result of a frame that nothing can start from.
+    fn unstarted(&self, frame: &Frame, doubt: Doubt) -> FrameResult {
+        let still = ExposureTrajectory::still(RigidTransform::identity());
+        let nothing = LevelOutcome::unchanged(Estimate::linear(still));
+        FrameResult { doubt: Some(doubt), ..FrameResult::of(self.frames, frame.timestamp, still, &nothing) }
+    }
+
+    /// An alignment that was not tried.
+    fn nothing(&self, motion: &Motion) -> Aligned {
+        let still = ExposureTrajectory::still(motion.reference_from_mid);
+        Aligned { outcome: LevelOutcome::unchanged(Estimate::linear(still)), work: Work::none() }
     }
 
     fn follow(&mut self, frame: &Frame, motion: &Motion) -> FrameResult {
@@ -232,23 +277,32 @@ impl<'m> Tracker<'m> {
                 }
             }
         }
-        let mut status = self.judge(&aligned.outcome, motion, frame);
+        let (mut status, mut doubt) = self.judge(&aligned.outcome, motion, frame);
         if status == FrameStatus::Lost && self.recover(frame, motion) {
             let start = self.motion.unwrap_or(*motion);
             aligned = self.align(frame, &start, self.config.align.blur, None);
-            status = match self.judge(&aligned.outcome, &start, frame) {
-                FrameStatus::Lost => {
-                    return self.resume(frame, &start.reference_from_mid);
-                }
-                _ => FrameStatus::Weak,
-            };
+            if self.judge(&aligned.outcome, &start, frame).0 == FrameStatus::Lost {
+                return self.resume(frame, &start.reference_from_mid);
+            }
+            (status, doubt) = (FrameStatus::Weak, Some(Doubt::FoundAgain));
         }
-        let mut result = match status {
-            FrameStatus::Lost => self.hold(frame, motion, &aligned),
-            _ => self.accept(frame, motion, &aligned, status),
-        };
-        result.revision = revision;
+        if status == FrameStatus::Lost {
+            return self.lose(frame, motion, &aligned, doubt.unwrap_or(Doubt::NoMatch));
+        }
+        self.established = true;
+        let mut result = self.accept(frame, motion, &aligned, status);
+        result.doubt = doubt;
+        result.revision = revision.or(self.late_revision.take());
         result
+    }
+
+    /// Holds the last good pose; when the very first frames after a start all disagree with it, starts anew.
+    fn lose(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned, doubt: Doubt) -> FrameResult {
+        self.lost_at_start += 1;
+        if !self.established && self.lost_at_start >= MAX_LOST_AT_START {
+            return self.start(frame);
+        }
+        self.hold(frame, motion, aligned, doubt)
     }
 
     /// Goes on from a view that was found again near an older keyframe, out of sight of the current one: the frame
@@ -261,119 +315,18 @@ impl<'m> Tracker<'m> {
         self.promote(world_from_mid, None, f32::MAX);
         self.motion = Some(Motion::still(frame.timestamp, *world_from_mid));
         result.status = FrameStatus::Weak;
+        result.doubt = Some(Doubt::FoundAgain);
         result.is_keyframe = true;
         result
     }
 
-    /// Aligns the first frame after the first keyframe, whose own motion is unknown.
-    ///
-    /// Both are blurred alike, so they are aligned as they are; the motion between them then deblurs the keyframe,
-    /// and the frame is aligned again.
-    fn bootstrap(&mut self, frame: &Frame, motion: &Motion) -> (Aligned, Option<Revision>) {
-        let timing = self.timing;
-        // Rows and depth are sheared alike in both, as long as neither is corrected.
-        self.timing = FrameTiming::GLOBAL;
-        let first = self.align(frame, motion, false, None);
-        self.timing = timing;
-        if self.judge(&first.outcome, motion, frame) == FrameStatus::Lost {
-            return (first, None);
-        }
-        let dt = frame.timestamp - motion.timestamp;
-        let mid = first.outcome.estimate.keyframe_from_camera.mid();
-        let rate = RigidTransform::identity().tangent_to(&mid) / dt;
-        self.set_keyframe_path(self.path_of_keyframe(&rate, &Vector6::zeros()));
-        let mut second = self.align(frame, motion, self.config.align.blur, Some(mid));
-        let refined = self.rate_before(&second.outcome.estimate, dt);
-        let mut path = self.path_of_keyframe(&refined, &Vector6::zeros());
-        if timing.reaches_outside() {
-            (second, path) = self.align_each_other(frame, motion, second);
-        } else {
-            self.keyframe.keyframe_from_camera = Some(path);
-        }
-        let exposure = exposure_of(&path, &self.keyframe.timing);
-        let revision = Revision {
-            index: self.keyframe.frame_index,
-            world_from_camera: exposure.seen_from(&self.keyframe.world_from_keyframe),
-            world_from_mid: self.keyframe.world_from_keyframe,
-            blur: self.blur_length(&exposure),
-        };
-        (second, Some(revision))
-    }
-
-    /// Velocity of the keyframe, per second, when a frame `dt` seconds later was aligned with `estimate`: the mean of the
-    /// velocities at both is that of the motion between them.
-    fn rate_before(&self, estimate: &Estimate, dt: f64) -> Vector6<f64> {
-        let between = RigidTransform::identity().tangent_to(&estimate.keyframe_from_camera.mid()) / dt;
-        between * 2.0 - estimate.keyframe_from_camera.motion() / self.span
-    }
-
-    /// The keyframe's path for a velocity and an acceleration at its middle, per second.
-    fn path_of_keyframe(&self, rate: &Vector6<f64>, acceleration: &Vector6<f64>) -> BowedTrajectory {
-        let span = self.keyframe_span;
-        let linear = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &(rate * span));
-        BowedTrajectory { linear, bow: acceleration * (0.5 * span * span) }
-    }
-
-    /// Aligns the frame with the keyframe and the keyframe with the frame in turn, until each has been given one time with
-    /// a path that was measured against the other. Returns the alignment of the frame and the keyframe's path.
-    fn align_each_other(
-        &mut self,
-        frame: &Frame,
-        motion: &Motion,
-        first: Aligned,
-    ) -> (Aligned, BowedTrajectory) {
-        let mut of_frame = first;
-        let mut of_keyframe =
-            BowedTrajectory::without_bow(ExposureTrajectory::still(RigidTransform::identity()));
-        for _ in 0..BOOTSTRAP_ROUNDS {
-            let keyframe_from_mid = of_frame.outcome.estimate.keyframe_from_camera.mid();
-            let mid_from_keyframe = keyframe_from_mid.inverse();
-            self.exchange_with_keyframe(of_frame.outcome.estimate.path().seen_from(&mid_from_keyframe));
-            let back = Frame { timestamp: motion.timestamp, ..*frame };
-            let from_frame = Motion::still(frame.timestamp, RigidTransform::identity());
-            let world_from_frame = self.keyframe.world_from_keyframe.compose(&keyframe_from_mid);
-            let world_from_keyframe =
-                core::mem::replace(&mut self.keyframe.world_from_keyframe, world_from_frame);
-            let from_frame = from_frame.seen_from(&world_from_frame);
-            let reverse = self.align(&back, &from_frame, self.config.align.blur, Some(mid_from_keyframe));
-            let frame_from_keyframe = reverse.outcome.estimate.path();
-            of_keyframe = frame_from_keyframe.seen_from(&frame_from_keyframe.linear.mid().inverse());
-            self.keyframe.world_from_keyframe = world_from_keyframe;
-            self.exchange_with_keyframe(of_keyframe);
-            let start = frame_from_keyframe.linear.mid().inverse();
-            of_frame = self.align(frame, motion, self.config.align.blur, Some(start));
-        }
-        (of_frame, of_keyframe)
-    }
-
-    /// Makes the current frame, which moved along `path` seen from its own mid pose, the keyframe, and the keyframe as it
-    /// was captured the current frame.
-    fn exchange_with_keyframe(&mut self, path: BowedTrajectory) {
-        let keyframe = &mut self.keyframe;
-        self.rectify.restore(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
-        keyframe.pyramid.reduce();
-        mem::swap(&mut self.pyramid, &mut keyframe.pyramid);
-        mem::swap(&mut self.depth, &mut keyframe.depth);
-        mem::swap(&mut self.timing, &mut keyframe.timing);
-        mem::swap(&mut self.span, &mut self.keyframe_span);
-        self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
-        keyframe.restart_surface();
-        self.set_keyframe_path(path);
-    }
-
-    fn set_keyframe_path(&mut self, path: BowedTrajectory) {
-        self.keyframe.keyframe_from_camera = Some(path);
-        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
-        self.sharpen_keyframe();
-    }
-
     /// Whether the motion of a frame around its middle matters: it blurs the frame, or its parts have different times.
-    fn path_is_modelled(&self) -> bool {
+    pub(super) fn path_is_modelled(&self) -> bool {
         (self.config.align.blur && self.timing.exposure * self.span > 0.0) || self.timing.reaches_outside()
     }
 
     /// Aligns the current frame with the keyframe; from `start` alone if it is given.
-    fn align(
+    pub(super) fn align(
         &mut self,
         frame: &Frame,
         world_motion: &Motion,
@@ -406,7 +359,10 @@ impl<'m> Tracker<'m> {
             motion: world_motion.seen_from(&self.keyframe.world_from_keyframe.inverse()),
             timestamp: frame.timestamp,
             span: self.span,
-            gyro: frame.angular_velocity,
+            gyro: frame.angular_velocity.map(|rate| rate - self.gyro_bias),
+            turning: frame
+                .gyro
+                .map(|gyro| GyroReading { angular_velocity: gyro.angular_velocity - self.gyro_bias, ..gyro }),
             brightness: self.brightness,
             blur,
             inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),
@@ -419,7 +375,12 @@ impl<'m> Tracker<'m> {
         aligned
     }
 
-    fn judge(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> FrameStatus {
+    pub(super) fn judge(
+        &self,
+        outcome: &LevelOutcome,
+        motion: &Motion,
+        frame: &Frame,
+    ) -> (FrameStatus, Option<Doubt>) {
         judge(outcome, &self.evidence(outcome, motion, frame), &self.typical)
     }
 
@@ -466,10 +427,21 @@ impl<'m> Tracker<'m> {
             between_frames: motion.reference_from_mid.tangent_to(&world_from_mid)
                 / (frame.timestamp - motion.timestamp),
             interval: frame.timestamp - motion.timestamp,
+            exposure: frame.exposure,
             within_exposure: self.path_is_modelled().then(|| world_path.linear.motion() / self.span),
             acceleration: world_path.bow * (2.0 / (self.span * self.span).max(f64::MIN_POSITIVE)),
         });
         self.brightness = outcome.estimate.brightness;
+        self.late_revision = self.revise_last(frame, motion, &world_from_mid);
+        self.last_index = self.frames;
+        if let Some(rate) = frame.angular_velocity
+            && status == FrameStatus::Ok
+        {
+            let seen =
+                motion.reference_from_mid.tangent_to(&world_from_mid) / (frame.timestamp - motion.timestamp);
+            let difference = rate - Vector3::from(seen.fixed_rows::<3>(3));
+            self.gyro_bias += (difference - self.gyro_bias) * GYRO_BIAS_SHARE;
+        }
         let correction = self.observe_path_error(frame, motion, &world_from_mid);
         if status == FrameStatus::Ok {
             self.typical.learn(outcome);
@@ -494,83 +466,13 @@ impl<'m> Tracker<'m> {
         result
     }
 
-    /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
-    /// correction of the keyframe's velocity, per second in the keyframe, when it is time for one.
-    fn observe_path_error(
-        &mut self,
-        frame: &Frame,
-        motion: &Motion,
-        world_from_mid: &RigidTransform,
-    ) -> Option<PathRate> {
-        let path_rate = motion.within_exposure.filter(|_| self.keyframe.timing.is_rolling())?;
-        let dt = frame.timestamp - motion.timestamp;
-        let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
-        if !motion.interval.is_finite() {
-            return None;
-        }
-        let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
-        let bend = next - motion.between_frames;
-        let between = 0.5 * (dt + motion.interval);
-        let mut sigma = self.path_sigma(MID_POSE_SHEAR, self.span);
-        for i in 0..12 {
-            let bend = bend.fixed_rows::<3>(i / 3 % 2 * 3).norm();
-            sigma[i] += if i < 6 { 0.3 * bend } else { 0.3 * bend / between };
-        }
-        let keyframe_from_world = self.keyframe.world_from_keyframe.inverse();
-        let mut difference = PathRate::zeros();
-        let velocity = rotated(&keyframe_from_world, &(path_rate - slope));
-        let acceleration = rotated(&keyframe_from_world, &(motion.acceleration - bend / between));
-        difference.fixed_rows_mut::<6>(0).copy_from(&velocity);
-        difference.fixed_rows_mut::<6>(6).copy_from(&acceleration);
-        self.path_error.observe(&difference, &sigma)
-    }
-
-    /// Standard deviations of a velocity that moves the picture by `pixels` within `span` seconds, and of an acceleration
-    /// that moves it by as much at both ends of them.
-    fn path_sigma(&self, pixels: f64, span: f64) -> PathRate {
-        let span = span.max(1e-6);
-        let angle = pixels / self.config.camera.fx / span;
-        let shift = angle / typical_inverse_depth(self.keyframe.finest_keypoints()).max(0.02);
-        PathRate::from_fn(|i, _| {
-            let of_velocity = if i / 3 % 2 == 0 { shift } else { angle };
-            if i < 6 { of_velocity } else { of_velocity * 8.0 / span }
-        })
-    }
-
-    /// Changes the keyframe's velocity by `correction` and shears picture and depth anew.
-    fn correct_keyframe_path(&mut self, correction: &PathRate) {
-        let Some(old) = self.keyframe.keyframe_from_camera else { return };
-        let span = self.keyframe_span;
-        let motion = old.linear.motion() + correction.fixed_rows::<6>(0) * span;
-        let bow = old.bow + correction.fixed_rows::<6>(6) * (0.5 * span * span);
-        let mid = RigidTransform::identity();
-        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), bow };
-        let depth_time = 0.5 + self.keyframe.timing.depth_time;
-        let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
-        self.keyframe.keyframe_from_camera = Some(path);
-        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
-        self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
-        self.keyframe.refit_surface();
-        let pixels = &mut *self.keyframe.pyramid.levels[0].pixels;
-        self.rectify.rectify_image(
-            &path,
-            &self.keyframe.timing,
-            &self.config.camera,
-            pixels,
-            &self.keyframe.depth,
-        );
-        self.keyframe.pyramid.reduce();
-        if !self.deblur_keyframe(&path) {
-            self.select_keypoints();
-        }
-    }
-
     /// Holds the last good pose.
-    fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned) -> FrameResult {
+    fn hold(&mut self, frame: &Frame, motion: &Motion, aligned: &Aligned, doubt: Doubt) -> FrameResult {
         let held = Motion { between_frames: motion.between_frames * 0.5, within_exposure: None, ..*motion };
         self.motion = Some(held);
         let world_from_camera = ExposureTrajectory::still(motion.reference_from_mid);
         let mut result = FrameResult::of(self.frames, frame.timestamp, world_from_camera, &aligned.outcome);
+        result.doubt = Some(doubt);
         result.reference_index = self.keyframe.frame_index;
         result
     }
@@ -609,92 +511,7 @@ impl<'m> Tracker<'m> {
         }
     }
 
-    /// Makes the current frame the keyframe.
-    fn promote(
-        &mut self,
-        world_from_keyframe: &RigidTransform,
-        keyframe_from_camera: Option<BowedTrajectory>,
-        blur: f32,
-    ) {
-        mem::swap(&mut self.pyramid, &mut self.keyframe.pyramid);
-        mem::swap(&mut self.depth, &mut self.keyframe.depth);
-        self.keyframe.world_from_keyframe = *world_from_keyframe;
-        self.keyframe.keyframe_from_camera = keyframe_from_camera;
-        self.keyframe.timing = self.timing;
-        self.keyframe_span = self.span;
-        self.path_error = PathError::unknown(&self.path_sigma(KEYFRAME_SHEAR, self.span));
-        self.keyframe.blur = blur;
-        self.keyframe.frame_index = self.frames;
-        self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
-        self.keyframe.restart_surface();
-        self.brightness = BrightnessModel::default();
-        let deblurred = self.sharpen_keyframe();
-        if !deblurred {
-            self.select_keypoints();
-        }
-    }
-
-    /// Gives the keyframe one time and deblurs it, with its own motion, and selects its keypoints; `false` if there is
-    /// nothing to do.
-    fn sharpen_keyframe(&mut self) -> bool {
-        self.work.image_pixels += self.pixels();
-        let Some(path) = self.keyframe.keyframe_from_camera else { return false };
-        let timing = self.keyframe.timing;
-        if timing.reaches_outside() {
-            let keyframe = &mut self.keyframe;
-            self.rectify.rectify(
-                &path,
-                &timing,
-                &self.config.camera,
-                keyframe.pyramid.levels[0].pixels,
-                &mut keyframe.depth,
-            );
-            keyframe.restart_surface();
-            keyframe.pyramid.reduce();
-        }
-        if self.deblur_keyframe(&path) {
-            return true;
-        }
-        if timing.reaches_outside() {
-            self.select_keypoints();
-        }
-        timing.reaches_outside()
-    }
-
-    /// Deblurs the keyframe with its path and selects its keypoints; `false` if it is not worth it.
-    fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
-        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
-        if self.config.reference == ReferenceMode::Raw || !worth {
-            return false;
-        }
-        let Some(typical) = self.keyframe.depth.mean() else { return false };
-        let longest = self.deblur.flow.fill(
-            path,
-            &self.keyframe.timing,
-            &self.config.camera,
-            &self.keyframe.planes,
-            self.config.surface_level,
-            typical,
-        );
-        let image = &mut self.keyframe.pyramid.levels[0];
-        self.deblur.capture(image.pixels);
-        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
-        self.work.blur_taps += report.taps;
-        self.keyframe.pyramid.reduce();
-        self.select_keypoints();
-        true
-    }
-
-    pub(super) fn select_keypoints(&mut self) {
-        self.keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
-    }
-
-    /// Remembers the coarse part of the keyframe for recovery before it is replaced.
-    pub(super) fn keep_keyframe(&mut self) {
-        self.recent.remember(&self.keyframe, self.config.surface_level);
-    }
-
-    fn blur_length(&self, keyframe_from_camera: &ExposureTrajectory) -> f32 {
+    pub(super) fn blur_length(&self, keyframe_from_camera: &ExposureTrajectory) -> f32 {
         blur_length(keyframe_from_camera, self.keyframe.finest_keypoints(), &self.config.camera)
     }
 }

@@ -4,9 +4,12 @@ use std::path::Path;
 
 use super::NAMES;
 use crate::gaussians::display_colour::linear_of;
-use crate::gaussians::store::{COLOUR, Gaussian, Gaussians, PARAMETERS};
+use crate::gaussians::store::{COLOUR, Gaussian, Gaussians, OPACITY_LOGIT, PARAMETERS};
 use crate::ply::{Element, Header, PlyError, Records};
 use crate::whole_file::read;
+
+/// What stands for an infinite logit of an opacity: the logistic function of it is 1 in single precision.
+const OPAQUE_LOGIT: f32 = 30.0;
 
 /// Reads a file of Gaussians, ascii or little-endian; see [`parse_ply`].
 ///
@@ -14,7 +17,7 @@ use crate::whole_file::read;
 ///
 /// If the file cannot be read or is not a file of Gaussians.
 pub fn read_ply(path: &Path) -> Result<Gaussians, PlyError> {
-    parse_ply(path, &read(path)?)
+    parse_ply(path, &read(path, crate::ply::MAGIC)?)
 }
 
 /// The Gaussians of a file with the content `bytes`; `path` only names it in errors.
@@ -35,8 +38,20 @@ pub fn parse_ply(path: &Path, bytes: &[u8]) -> Result<Gaussians, PlyError> {
         }
         let fields = fields(path, element)?;
         let mut gaussians = Gaussians::default();
-        records.read(element, &fields, |_, record| {
-            gaussians.push(&gaussian(fields.map(|field| record.numbers[field] as f32)));
+        let needed: Vec<usize> =
+            fields.iter().copied().filter(|field| *field != fields[OPACITY_LOGIT]).collect();
+        records.read(element, &needed, |index, record| {
+            let mut values = fields.map(|field| record.numbers[field] as f32);
+            if values[OPACITY_LOGIT].is_nan() {
+                let (path, element, property) =
+                    (path.to_owned(), element.name.clone(), NAMES[OPACITY_LOGIT].to_owned());
+                return Err(PlyError::NotFinite { path, element, index, property, found: "nan".to_owned() });
+            }
+            // Some trainers write infinity for what hides all behind it; this is as opaque in single precision.
+            if values[OPACITY_LOGIT].is_infinite() {
+                values[OPACITY_LOGIT] = OPAQUE_LOGIT.copysign(values[OPACITY_LOGIT]);
+            }
+            gaussians.push(&gaussian(values));
             Ok(())
         })?;
         return Ok(gaussians);

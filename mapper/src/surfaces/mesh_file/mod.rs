@@ -4,7 +4,7 @@ mod read;
 mod write;
 
 pub use read::{parse_mesh, read_mesh};
-pub use write::{format_mesh, write_mesh};
+pub use write::{format_mesh, is_own_mesh, write_mesh};
 
 #[cfg(test)]
 mod tests {

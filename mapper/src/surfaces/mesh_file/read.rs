@@ -14,7 +14,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// # Errors
 /// If the file cannot be read or is not such a file.
 pub fn read_mesh(path: &Path) -> Result<Mesh, PlyError> {
-    parse_mesh(path, &read(path)?)
+    parse_mesh(path, &read(path, crate::ply::MAGIC)?)
 }
 
 /// The mesh of a file with the content `bytes`; `path` only names it in errors.

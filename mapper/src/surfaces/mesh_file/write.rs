@@ -6,6 +6,9 @@ use crate::FileError;
 use crate::surfaces::Mesh;
 use crate::whole_file::write_together;
 
+/// What every mesh of this program starts with.
+const START: &str = "ply\nformat binary_little_endian 1.0\ncomment lengths in metres\n";
+
 /// Writes a mesh, see [`format_mesh`]; beside its place and then renamed, so that a full disk never leaves half a
 /// file.
 ///
@@ -13,6 +16,12 @@ use crate::whole_file::write_together;
 /// [`FileError::Unwritable`].
 pub fn write_mesh(path: &Path, mesh: &Mesh) -> Result<(), FileError> {
     write_together(&[(path.to_owned(), format_mesh(mesh))])
+}
+
+/// Whether a file that begins with `start` is a mesh as [`format_mesh`] makes it.
+#[must_use]
+pub fn is_own_mesh(start: &[u8]) -> bool {
+    start.starts_with(START.as_bytes())
 }
 
 /// The content of a little-endian PLY file: positions as `float x y z`, colours, if there are any, as
@@ -36,7 +45,7 @@ pub fn format_mesh(mesh: &Mesh) -> Vec<u8> {
 }
 
 fn header(mesh: &Mesh, coloured: bool) -> String {
-    let mut text = String::from("ply\nformat binary_little_endian 1.0\ncomment lengths in metres\n");
+    let mut text = String::from(START);
     text += &format!("element vertex {}\n", mesh.vertices.len());
     text += "property float x\nproperty float y\nproperty float z\n";
     if coloured {

@@ -24,7 +24,7 @@ const DECODERS_LEN: usize = 4 * (Layers::<1>::COUNT + Layers::<3>::COUNT);
 /// # Errors
 /// All of [`FieldFileError`]; of several defects the one that explains the others.
 pub fn read_field(path: &Path) -> Result<TriplaneField, FieldFileError> {
-    let bytes = read(path)?;
+    let bytes = read(path, &MAGIC)?;
     let mut file = Reader { path, bytes: &bytes };
     file.check_start()?;
     let header = file.header()?;

@@ -1,0 +1,82 @@
+//! Whether a run achieved anything, and why not.
+
+use mba_mapper::dataset::Dataset;
+use mba_mapper::run::{FrameRecord, FrameStatus, Summary};
+
+use crate::console::Console;
+use crate::failure::failed;
+
+/// Frames that are looked at for the reason of a failure.
+const SAMPLED_FRAMES: usize = 16;
+
+/// A share of frames that are lost above which a finished run is worth a warning.
+const WORRYING_SHARE: f64 = 0.1;
+
+/// Mean of the stored colour values below which an image is black.
+const BLACK: f64 = 2.0;
+
+/// Advice for a recording that cannot be tracked.
+const HINT: &str = "`mba info DATASET` shows what the images hold";
+
+/// Whether no frame was found by aligning it: the first one of any input is where the world begins.
+#[must_use]
+pub fn nothing_tracked(frames: &[FrameRecord]) -> bool {
+    let tracked = frames.iter().filter(|frame| frame.status != FrameStatus::Lost).count();
+    tracked < frames.len().min(2)
+}
+
+/// Fails for a run without any tracked frame, and warns of one with many lost.
+///
+/// # Errors
+/// The failure, with the reason.
+pub fn check(summary: &Summary, dataset: &Dataset, console: &Console) -> anyhow::Result<()> {
+    let counts = summary.frames;
+    if counts.ok + counts.weak < counts.total.min(2) {
+        return Err(failure(dataset, ""));
+    }
+    let not_tried = counts.skipped;
+    let lost = counts.lost - not_tried.min(counts.lost);
+    if lost as f64 > WORRYING_SHARE * counts.total as f64 {
+        console.warning(format!("{lost} of {} frames could not be aligned and are lost", counts.total));
+    }
+    Ok(())
+}
+
+/// The failure of tracking `dataset`, with the reason that a look at its images gives and a remark.
+#[must_use]
+pub fn failure(dataset: &Dataset, remark: &str) -> anyhow::Error {
+    failed(format!("nothing could be tracked: {}{remark}", reason(dataset)), HINT)
+}
+
+/// Why nothing can be tracked, in a sentence.
+fn reason(dataset: &Dataset) -> String {
+    let sampled = dataset.len().min(SAMPLED_FRAMES);
+    let (mut unreadable, mut first_error) = (0, None);
+    let (mut without_depth, mut black, mut readable) = (0, 0, 0);
+    for k in 0..sampled {
+        match dataset.frame(k * dataset.len() / sampled) {
+            Err(error) => {
+                unreadable += 1;
+                first_error.get_or_insert(error.to_string());
+            }
+            Ok(frame) => {
+                readable += 1;
+                without_depth += usize::from(frame.depth_is_empty());
+                let sum: f64 = frame.rgb.iter().map(|value| f64::from(*value)).sum();
+                black += usize::from(sum < BLACK * frame.rgb.len() as f64);
+            }
+        }
+    }
+    // A single frame that is good can be the first: nothing follows it that could be aligned.
+    let is_all_but_one = |count: usize| count > 0 && count + 1 >= readable;
+    match first_error {
+        Some(error) if readable < 2 => {
+            format!("{unreadable} of {sampled} sampled frames cannot be read, the first because {error}")
+        }
+        _ if is_all_but_one(black) => format!("{black} of {readable} sampled colour images are black"),
+        _ if is_all_but_one(without_depth) => {
+            format!("{without_depth} of {readable} sampled depth images hold no depth at all")
+        }
+        _ => format!("no frame of {} could be aligned with another", dataset.folder().display()),
+    }
+}

@@ -1,0 +1,178 @@
+//! `synth` with a camera as people have it, and what `info` says about it.
+
+use std::ffi::OsStr;
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::{Workplace, mba};
+
+/// Renders a small sequence into the folder `name` of the work place.
+fn synth(place: &Workplace, name: &str, options: &[&str]) {
+    let out = place.path(name);
+    let size = ["--frames", "8", "--size", "64x48", "--blur", "1", "-q"];
+    let fixed = ["synth", "--out"].map(OsStr::new).into_iter().chain([out.as_os_str()]);
+    let outcome = mba(fixed.chain(size.iter().chain(options).map(OsStr::new)));
+    assert_eq!(outcome.code, Some(0), "{}", outcome.stderr);
+}
+
+fn info(place: &Workplace, name: &str) -> Value {
+    mba([Path::new("info"), &place.path(name), Path::new("--json")]).json()
+}
+
+fn warnings(info: &Value) -> Vec<&str> {
+    info["warnings"].as_array().unwrap().iter().filter_map(Value::as_str).collect()
+}
+
+const TELEPHONE: [&str; 10] = [
+    "--readout",
+    "-0.02",
+    "--depth-delay",
+    "0.011",
+    "--auto-exposure",
+    "--vignetting",
+    "-0.35,0.05",
+    "--imu",
+    "--response",
+    "linear",
+];
+
+#[test]
+fn info_tells_what_is_on_record() {
+    let place = Workplace::new();
+    synth(&place, "known", &TELEPHONE);
+    let info = info(&place, "known");
+    assert_eq!((&info["readout"], &info["readout_s"]), (&"rolling".into(), &(-0.02).into()));
+    assert_eq!(info["response"], "linear");
+    assert_eq!(info["vignetting"], serde_json::json!([-0.35, 0.05]));
+    assert_eq!(info["exposure_source"], "per frame");
+    assert_eq!(info["longest_exposure_s"], 0.018);
+    assert!(info["shortest_exposure_s"].as_f64().unwrap() >= 0.007);
+    assert!((info["depth_delay_s"].as_f64().unwrap() - 0.011).abs() < 1e-6);
+    for sensor in ["gyroscope_hz", "accelerometer_hz"] {
+        assert!((info[sensor].as_f64().unwrap() - 200.0).abs() < 0.1, "{info}");
+    }
+    assert_eq!(info["imu_share_of_frames"], 1.0);
+    for fact in ["exposure", "readout", "response", "vignetting", "camera"] {
+        assert_eq!(info["sources"][fact], "recorded", "{fact}");
+    }
+    assert_eq!(info["sources"]["depth_delay"], "assumed", "only the timestamps tell");
+    assert_eq!(warnings(&info), [""; 0]);
+
+    let table = mba([Path::new("info"), &place.path("known")]).stdout;
+    for expected in [
+        "linear (recorded)",
+        "1 + -0.35 r^2 + 0.05 r^4, 70 % of the light in the corner (recorded)",
+        "rolling, -20.00 ms (recorded)",
+        "18.00 ms (per frame)",
+        "11.00 ms",
+        "gyroscope 200 Hz, accelerometer 200 Hz, covers 100.0 % of the frames",
+    ] {
+        assert!(table.contains(expected), "no {expected} in\n{table}");
+    }
+}
+
+#[test]
+fn info_tells_what_is_not_on_record() {
+    let place = Workplace::new();
+    synth(&place, "silent", &[&TELEPHONE[..], &["--nothing-on-record"]].concat());
+    let info = info(&place, "silent");
+    assert_eq!((&info["readout"], &info["readout_s"]), (&"rolling".into(), &Value::Null));
+    for fact in ["exposure", "response", "vignetting"] {
+        assert_eq!(info["sources"][fact], "assumed", "{fact}");
+    }
+    assert_eq!(
+        warnings(&info),
+        [
+            "response is not given, \"srgb\" is assumed",
+            "exposure_seconds is not given, 0.0167 s (0.5 of the frame interval) is assumed",
+            "rows are exposed one after the other, but readout_seconds does not say in which time",
+        ]
+    );
+    let truth = fs::read_to_string(place.path("silent/truth/calibration.toml")).unwrap();
+    assert!(truth.contains("readout_seconds = -0.02\nvignetting = [-0.35, 0.05]\n"), "{truth}");
+}
+
+#[test]
+fn contradictions_are_named() {
+    let place = Workplace::new();
+    synth(&place, "odd", &[]);
+    let calibration = place.path("odd/calibration.toml");
+    let text = fs::read_to_string(&calibration).unwrap();
+    let text = text
+        .replace("exposure_seconds = 0.016", "exposure_seconds = 0.04")
+        .replace("readout = \"global\"", "readout_seconds = 0.05\ndepth_delay_seconds = -0.02");
+    fs::write(&calibration, text).unwrap();
+    // Degrees per second and units of gravity, until 0.21 s. Rows are exposed from 45 ms before a timestamp until 45 ms
+    // after it, and frames are at 0.1, 0.133, 0.167 s and so on: two of eight are covered.
+    let row = |k: i32| format!("{},40,0,0,0,-1,0\n", f64::from(k) / 200.0);
+    let header = "timestamp,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2\n";
+    fs::write(place.path("odd/imu.csv"), [header, &(0..43).map(row).collect::<String>()].concat()).unwrap();
+    assert_eq!(
+        warnings(&info(&place, "odd")),
+        [
+            "exposure of 0.04 s is longer than the 0.033333 s between frames",
+            "readout_seconds of 0.05 s is longer than the 0.033333 s between frames",
+            "depth is -0.020000 s from colour, more than half of the 0.033333 s between frames: another depth image is \
+             nearer",
+            "the gyroscope turns with up to 40.0 rad/s; is it in degrees per second?",
+            "the accelerometer feels 1.00 m/s^2 in the median, where gravity alone is 9.81; is it in units of gravity, \
+             or without it?",
+            "the IMU covers the exposure of only 25.0 % of the frames, or has gaps there",
+        ]
+    );
+
+    synth(&place, "milliseconds", &[]);
+    let list = place.path("milliseconds/associations.txt");
+    let line = |k: i32| format!("{0} rgb/{k:06}.png {0} depth/{k:06}.png\n", 32 * k);
+    fs::write(&list, (0..8).map(line).collect::<String>()).unwrap();
+    let info = info(&place, "milliseconds");
+    let expected = "frames are 32 s apart; timestamps are in seconds, these look like milliseconds";
+    assert!(warnings(&info).contains(&expected), "{info}");
+}
+
+#[test]
+fn mishaps_happen_to_the_frames_that_are_named() {
+    let place = Workplace::new();
+    let mishaps =
+        ["--black", "1-2,4", "--saturated", "5", "--jump", "6", "--noise", "off", "--depth", "exact"];
+    synth(&place, "mishaps", &mishaps);
+    let dataset = mba_mapper::dataset::open(&place.path("mishaps")).unwrap();
+    let frames: Vec<_> = (0..8).map(|k| dataset.frame(k).unwrap()).collect();
+    let is_filled = |k: usize, value: u8| frames[k].rgb.iter().all(|byte| *byte == value);
+    let black: Vec<usize> = (0..8).filter(|k| is_filled(*k, 0)).collect();
+    let white: Vec<usize> = (0..8).filter(|k| is_filled(*k, 255)).collect();
+    let without_depth: Vec<usize> = (0..8).filter(|k| frames[*k].depth_is_empty()).collect();
+    assert_eq!((black, white, without_depth), (vec![1, 2, 4], vec![5], vec![1, 2, 4, 5]));
+    // What is seen again is the same up to the rounding of times to microseconds.
+    let differing = frames[6].rgb.iter().zip(&frames[0].rgb).filter(|(a, b)| a.abs_diff(**b) > 1).count();
+    assert!(differing < frames[0].rgb.len() / 100, "{differing} values differ");
+    let truth = dataset.ground_truth();
+    let apart = truth[6].world_from_camera.tangent_to(&truth[0].world_from_camera).norm();
+    assert!(apart < 1e-5, "{apart}");
+}
+
+#[test]
+fn a_response_comes_from_a_file() {
+    let place = Workplace::new();
+    let file = place.path("curve.csv");
+    let curve = place.path("curve.csv").display().to_string();
+    // What is stored is the third root of light.
+    let rows: String =
+        (0..=100).map(|k| format!("{},{}\n", f64::from(k).powi(3) / 1e6, f64::from(k) / 1e2)).collect();
+    fs::write(&file, format!("light,value\n{rows}")).unwrap();
+    synth(&place, "measured", &["--response", &curve]);
+    assert_eq!(info(&place, "measured")["response"], "table");
+    let dataset = mba_mapper::dataset::open(&place.path("measured")).unwrap();
+    let inverse = dataset.calibration().response.inverse();
+    let expected = (128.0_f64 / 255.0).powi(3);
+    assert!((f64::from(inverse.linear_light(128)) - expected).abs() < 1e-4);
+
+    fs::write(&file, "light,value\n0,0\n0.5,2\n").unwrap();
+    let out = place.path("other");
+    let arguments = ["synth", "--response", &curve, "--out"].map(OsStr::new);
+    let refused = mba(arguments.into_iter().chain([out.as_os_str()]));
+    refused.assert_error(2, &["curve.csv, line 3", "rows light,value"]);
+    assert!(!out.exists());
+}

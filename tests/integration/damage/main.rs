@@ -1,0 +1,239 @@
+//! Every kind of file with every kind of damage: a command ends with an exit code, one sentence that names what is wrong,
+//! within time and memory, and nothing that it was not asked to write has changed.
+//!
+//! `MBA_DAMAGE=N cargo test --test damage` tries `N` random mutations of every file in place of the usual few.
+
+#![cfg(target_os = "linux")]
+
+mod mutation;
+mod place;
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use mba_tests::tree::{copy, differences, tree};
+use mutation::{Mutation, of_any_file, of_png, of_text};
+use place::{Outcome, mba, pristine};
+
+/// Random mutations of every file unless the environment asks for more.
+const FLIPS: u32 = 6;
+
+/// Seconds that no command takes.
+const LONGEST: f64 = 60.0;
+
+/// A file, what kind of damage fits it, and the command that reads it.
+struct Subject {
+    file: &'static str,
+    kind: Kind,
+    command: &'static [&'static str],
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    Text,
+    Binary,
+    Png,
+}
+
+const INFO: &[&str] = &["info", "data"];
+const INFO_OF_LISTS: &[&str] = &["info", "listed"];
+const RENDER: &[&str] = &["render", "mapped", "--poses", "poses.txt", "--out", "out", "--size", "16x12"];
+const RENDER_FIELD: &[&str] = &["render", "field", "--poses", "poses.txt", "--out", "out", "--size", "16x12"];
+const EVAL_MESH: &[&str] = &[
+    "eval",
+    "mesh",
+    "--reference",
+    "data/surface_points.ply",
+    "--estimate",
+    "mesh.ply",
+    "--samples",
+    "1000",
+];
+const EVAL_EXPOSURES: &[&str] = &[
+    "eval",
+    "trajectory",
+    "--reference",
+    "data/groundtruth_exposure.txt",
+    "--estimate",
+    "run/exposures.txt",
+];
+const EVAL_TRAJECTORY: &[&str] =
+    &["eval", "trajectory", "--reference", "data/groundtruth.txt", "--estimate", "run/trajectory.txt"];
+const EVAL_IMAGES: &[&str] = &["eval", "images", "--reference", "images", "--estimate", "others"];
+const RESUME: &[&str] = &["map", "data", "--trajectory", "run", "--out", "stopped", "--resume"];
+const MAP: &[&str] = &["map", "data", "--trajectory", "run", "--out", "out", "--time-budget", "0.05"];
+const TRACK: &[&str] = &["track", "data", "--out", "out"];
+const REPORT: &[&str] = &["report", "run", "--dataset", "data"];
+
+const fn text(file: &'static str, command: &'static [&'static str]) -> Subject {
+    Subject { file, kind: Kind::Text, command }
+}
+
+const fn binary(file: &'static str, command: &'static [&'static str]) -> Subject {
+    Subject { file, kind: Kind::Binary, command }
+}
+
+const fn png(file: &'static str, command: &'static [&'static str]) -> Subject {
+    Subject { file, kind: Kind::Png, command }
+}
+
+const SUBJECTS: &[Subject] = &[
+    text("data/associations.txt", INFO),
+    text("listed/rgb.txt", INFO_OF_LISTS),
+    text("listed/depth.txt", INFO_OF_LISTS),
+    text("data/calibration.toml", INFO),
+    text("data/calibration.toml", TRACK),
+    text("data/groundtruth.txt", INFO),
+    text("data/groundtruth_exposure.txt", INFO),
+    text("data/exposures.csv", INFO),
+    text("data/response.txt", INFO),
+    text("data/gyro.csv", INFO),
+    png("data/rgb/000000.png", INFO),
+    binary("data/rgb/000002.jpg", INFO),
+    png("data/depth/000003.png", INFO),
+    png("data/depth/000000.png", MAP),
+    text("run/trajectory.txt", EVAL_TRAJECTORY),
+    text("data/groundtruth.txt", EVAL_TRAJECTORY),
+    text("run/exposures.txt", EVAL_EXPOSURES),
+    text("run/exposures.txt", MAP),
+    text("run/frames.csv", MAP),
+    text("run/summary.json", REPORT),
+    text("mapped/summary.json", RENDER),
+    text("mapped/exposures.txt", RENDER),
+    text("mapped/frames.csv", RENDER),
+    text("poses.txt", RENDER),
+    binary("mapped/map.ply", RENDER),
+    binary("field/map.mbaf", RENDER_FIELD),
+    binary("mesh.ply", EVAL_MESH),
+    binary("data/surface_points.ply", EVAL_MESH),
+    png("images/000000.png", EVAL_IMAGES),
+    png("others/000001.png", EVAL_IMAGES),
+    binary("stopped/checkpoint", RESUME),
+];
+
+impl Subject {
+    fn mutations(&self, flips: u32) -> Vec<Mutation> {
+        let mut mutations = of_any_file(flips);
+        match self.kind {
+            Kind::Text => mutations.extend(of_text()),
+            Kind::Png => mutations.extend(of_png()),
+            Kind::Binary => {}
+        }
+        mutations
+    }
+
+    /// What the command may write: its output, or its own files in the run.
+    fn may_change(&self, path: &Path) -> bool {
+        let own = match self.command[0] {
+            "report" => ["run/plots", "run/report.html"],
+            "map" if self.command.contains(&"stopped") => ["stopped", "stopped"],
+            _ => ["out", "out"],
+        };
+        own.iter().any(|own| path.starts_with(own))
+    }
+}
+
+/// Damages the file in `folder`, runs the command, and puts everything back; returns what was wrong.
+fn attempt(folder: &Path, good: &Path, subject: &Subject, mutation: Mutation) -> Result<Outcome, String> {
+    let path = folder.join(subject.file);
+    let content = fs::read(&path).unwrap();
+    mutation.apply(&path, &content).unwrap();
+    // Pipes and endless files cannot be read: the comparison is of all else.
+    let without = |root: &Path| {
+        let hidden = root.with_file_name("hidden");
+        let _ = fs::rename(root.join(subject.file), &hidden);
+        let items = tree(root);
+        let _ = fs::rename(&hidden, root.join(subject.file));
+        items
+    };
+    let before = without(folder);
+    let outcome = mba(folder, subject.command);
+    let mut changed = differences(&before, &without(folder));
+    changed.retain(|path| !subject.may_change(path));
+    let verdict = judge(&outcome, subject, &changed);
+    // A map that was resumed in spite of the damage has replaced the file itself.
+    for name in ["out", "stopped", "run", "data"] {
+        let _ = fs::remove_dir_all(folder.join(name));
+        if good.join(name).exists() {
+            copy(&good.join(name), &folder.join(name));
+        }
+    }
+    remove(&path);
+    fs::write(&path, content).unwrap();
+    verdict.map(|()| outcome)
+}
+
+fn remove(path: &Path) {
+    if fs::remove_file(path).is_err() {
+        let _ = fs::remove_dir_all(path);
+    }
+}
+
+fn judge(outcome: &Outcome, subject: &Subject, changed: &[PathBuf]) -> Result<(), String> {
+    let Outcome { code, stderr, seconds } = outcome;
+    let complain = |what: &str| Err(format!("{what}, exit code {code:?}, {seconds:.1} s:\n{stderr}"));
+    if !changed.is_empty() {
+        return complain(&format!("{changed:?} changed"));
+    }
+    if stderr.contains("panicked") || *seconds > LONGEST {
+        return complain("panic or too slow");
+    }
+    let errors: Vec<&str> = stderr.lines().filter(|line| line.starts_with("error: ")).collect();
+    match code {
+        Some(0) if errors.is_empty() => Ok(()),
+        Some(1 | 2) if errors.len() == 1 => {
+            // The damage can show in another file, whose name is told then: an image that does not fit its calibration.
+            let folder = subject.file.split(['/', '.']).next().unwrap_or_default();
+            let stem = Path::new(subject.file).file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+            let names_it = [folder, stem, "the run ", "frame "].iter().any(|name| errors[0].contains(name));
+            if !names_it {
+                return complain("the sentence names no file");
+            }
+            if *code == Some(2) && !stderr.contains("hint: ") { complain("no advice") } else { Ok(()) }
+        }
+        _ => complain("neither success nor one sentence"),
+    }
+}
+
+#[test]
+fn every_file_survives_every_damage() {
+    let flips = std::env::var("MBA_DAMAGE").ok().and_then(|text| text.parse().ok()).unwrap_or(FLIPS);
+    let good = pristine();
+    let mut cases: Vec<(usize, Mutation)> = Vec::new();
+    for (index, subject) in SUBJECTS.iter().enumerate() {
+        cases.extend(subject.mutations(flips).into_iter().map(|mutation| (index, mutation)));
+    }
+    let (next, failures) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let codes = Mutex::new([0_usize; 3]);
+    let work = || {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("work");
+        copy(good.path(), &folder);
+        while let Some((subject, mutation)) = cases.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let subject = &SUBJECTS[*subject];
+            match attempt(&folder, good.path(), subject, *mutation) {
+                Ok(outcome) => codes.lock().unwrap()[outcome.code.unwrap_or(0) as usize] += 1,
+                Err(why) => {
+                    let words = subject.command.join(" ");
+                    failures
+                        .lock()
+                        .unwrap()
+                        .push(format!("{} {mutation:?}, mba {words}: {why}", subject.file));
+                }
+            }
+        }
+    };
+    thread::scope(|scope| {
+        let workers = thread::available_parallelism().map_or(1, usize::from);
+        (0..workers).for_each(|_| drop(scope.spawn(work)));
+    });
+    let (failures, codes) = (failures.into_inner().unwrap(), codes.into_inner().unwrap());
+    println!("{} inputs: exit codes 0, 1, 2: {codes:?}", cases.len());
+    assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), cases.len(), failures.join("\n"));
+    let kinds: BTreeSet<&str> = SUBJECTS.iter().map(|subject| subject.file).collect();
+    assert!(kinds.len() >= 25 && codes[2] > codes[0] / 4, "the damage does not reach the readers: {codes:?}");
+}

@@ -1,0 +1,108 @@
+//! Rows that are exposed one after the other: the gradient by all parameters of a path with bow against finite
+//! differences, and a band of the whole image with rows at the same time against the plain kernel.
+
+use mba_tests::transfer_scene::TransferScene;
+use mba_tracker::geometry::{RigidTransform, so3};
+use mba_tracker::simd::Level;
+use mba_tracker::trajectory::{BowedTrajectory, FrameTiming};
+use mba_tracker::transfer::{
+    BOWED_PATH, PATCH_PIXELS, PatchCost, RowBand, RowTimes, TransferProblem, VirtualView, evaluate_cost,
+    linearize, linearize_bowed,
+};
+use nalgebra::{SVector, Vector3, Vector6};
+
+const VIEWS: usize = 5;
+const STEP: f64 = 2e-4;
+const INVERSE_DEPTH: f64 = 0.4;
+
+type Path = SVector<f64, BOWED_PATH>;
+
+fn timing() -> FrameTiming {
+    FrameTiming { exposure: 0.4, readout: 0.6, bands: 8, ..FrameTiming::GLOBAL }
+}
+
+fn path(scene: &TransferScene) -> BowedTrajectory {
+    BowedTrajectory { linear: scene.exposure, bow: Vector6::new(0.02, -0.01, 0.015, -0.02, 0.03, 0.01) }
+}
+
+/// The path after a step in the kernel's parameters: left rotations of the ends, right ones of the bow.
+fn stepped(path: &BowedTrajectory, step: &Path) -> BowedTrajectory {
+    let moved = |pose: &RigidTransform, first: usize| {
+        let turn = Vector3::from(step.fixed_rows::<3>(first + 3));
+        let shift = Vector3::from(step.fixed_rows::<3>(first));
+        RigidTransform::new(so3::exp(&turn) * pose.rotation, pose.translation + shift)
+    };
+    let mut stepped = *path;
+    stepped.linear.start = moved(&path.linear.start, 0);
+    stepped.linear.end = moved(&path.linear.end, 6);
+    stepped.bow += step.fixed_rows::<6>(12);
+    stepped
+}
+
+fn problem<'a>(scene: &'a TransferScene, views: &'a [VirtualView], band: RowBand) -> TransferProblem<'a> {
+    let step = (timing().readout / scene.camera.height as f64) as f32;
+    TransferProblem { rows: RowTimes { centre: band.centre() as f32, step }, ..scene.problem_with(views) }
+}
+
+#[test]
+fn gradient_by_a_path_with_bow_equals_finite_differences() {
+    let (level, model) = (Level::new(), TransferScene::residual_model());
+    for seed in 30..34 {
+        let mut scene = TransferScene::random(seed, 900, VIEWS);
+        let (w, h) = (scene.camera.width, scene.camera.height);
+        let band = RowBand::new(5, 8, h);
+        let views_of = |path: &BowedTrajectory, scene: &TransferScene| {
+            band.views(path, &timing(), VIEWS, &scene.camera, INVERSE_DEPTH).to_vec()
+        };
+        let path = path(&scene);
+        let views = views_of(&path, &scene);
+        let mut patches = vec![PatchCost::default(); scene.sites.len()];
+        linearize_bowed(level, &problem(&scene, &views, band), &scene.sites, &model, &mut patches);
+        let mut whole = patches.iter().map(|patch| patch.pixels == PATCH_PIXELS as f32);
+        scene.sites.retain(|_| whole.next().unwrap_or(false));
+        scene.sites.retain(|site| {
+            let in_band = (band.first..band.end).contains(&(site.v.max(0) as usize));
+            in_band && site.u > 60 && site.u < w as i16 - 60
+        });
+        let cost = |path: &BowedTrajectory| {
+            let mut patches = vec![PatchCost::default(); scene.sites.len()];
+            let views = views_of(path, &scene);
+            evaluate_cost(level, &problem(&scene, &views, band), &scene.sites, &model, &mut patches);
+            patches.iter().map(|patch| f64::from(patch.cost)).sum::<f64>()
+        };
+        let difference = Path::from_fn(|i, _| {
+            let mut step = Path::zeros();
+            // The bow is seen through the square of a time below one.
+            step[i] = if i < 12 { STEP } else { 4.0 * STEP };
+            (cost(&stepped(&path, &step)) - cost(&stepped(&path, &-step))) / (2.0 * step[i])
+        });
+        let sums = linearize_bowed(level, &problem(&scene, &views, band), &scene.sites, &model, &mut patches);
+        let gradient = sums.gradient.fixed_rows::<BOWED_PATH>(0);
+        for (name, first, count) in [("ends", 0, 12), ("bow", 12, 6)] {
+            let (found, expected) = (gradient.rows(first, count), difference.rows(first, count));
+            let error = (found - expected).norm() / expected.norm();
+            let sites = scene.sites.len();
+            assert!(
+                sites > 20 && error < 0.03,
+                "{name}, seed {seed}, {sites} sites: relative error {error:e}"
+            );
+        }
+    }
+}
+
+#[test]
+fn rows_at_the_same_time_are_those_of_the_plain_kernel() {
+    let (level, model) = (Level::new(), TransferScene::residual_model());
+    let scene = TransferScene::random(40, 200, VIEWS);
+    let still = FrameTiming::GLOBAL;
+    let straight = BowedTrajectory::without_bow(scene.exposure);
+    let band = RowBand::whole(scene.camera.height);
+    let views = band.views(&straight, &still, VIEWS, &scene.camera, INVERSE_DEPTH).to_vec();
+    let mut patches = vec![PatchCost::default(); scene.sites.len()];
+    let plain = linearize(level, &scene.problem(), &scene.sites, &model, &mut patches);
+    let bowed = linearize_bowed(level, &scene.problem_with(&views), &scene.sites, &model, &mut patches);
+    assert_eq!(plain.pixels, bowed.pixels);
+    assert!((plain.cost - bowed.cost).abs() < 1e-5 * plain.cost);
+    let ends = bowed.gradient.fixed_rows::<12>(0) - plain.gradient.fixed_rows::<12>(0);
+    assert!(ends.norm() < 1e-4 * plain.gradient.norm(), "{}", ends.norm() / plain.gradient.norm());
+}

@@ -1,0 +1,188 @@
+//! Making and mending the reference: frames become keyframes, with one time for all rows and without their blur.
+
+use core::mem;
+
+use super::config::ReferenceMode;
+use super::frame::Frame;
+use super::history::{Motion, rotated};
+use super::keyframe_path::{PathError, PathRate};
+use super::track::{Tracker, exposure_of};
+use crate::geometry::RigidTransform;
+use crate::keyframe::typical_inverse_depth;
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory};
+use crate::transfer::BrightnessModel;
+
+/// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
+const MIN_STRENGTH: f32 = 0.02;
+
+/// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
+const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
+
+/// Standard deviation of a keyframe's velocity and of one between mid poses, as a shear in pixels over the path of a frame.
+const KEYFRAME_SHEAR: f64 = 2.0;
+const MID_POSE_SHEAR: f64 = 0.3;
+
+impl Tracker<'_> {
+    /// Makes the current frame the keyframe.
+    pub(super) fn promote(
+        &mut self,
+        world_from_keyframe: &RigidTransform,
+        keyframe_from_camera: Option<BowedTrajectory>,
+        blur: f32,
+    ) {
+        mem::swap(&mut self.pyramid, &mut self.keyframe.pyramid);
+        mem::swap(&mut self.depth, &mut self.keyframe.depth);
+        self.keyframe.world_from_keyframe = *world_from_keyframe;
+        self.keyframe.keyframe_from_camera = keyframe_from_camera;
+        self.keyframe.timing = self.timing;
+        self.keyframe_span = self.span;
+        self.keyframe_gyro = self.gyro;
+        self.path_error = PathError::unknown(&self.path_sigma(KEYFRAME_SHEAR, self.span));
+        self.keyframe.blur = blur;
+        self.keyframe.frame_index = self.frames;
+        self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
+        self.keyframe.restart_surface();
+        self.brightness = BrightnessModel::default();
+        let deblurred = self.sharpen_keyframe();
+        if !deblurred {
+            self.select_keypoints();
+        }
+    }
+
+    pub(super) fn set_keyframe_path(&mut self, path: BowedTrajectory) {
+        self.keyframe.keyframe_from_camera = Some(path);
+        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
+        self.sharpen_keyframe();
+    }
+
+    /// Gives the keyframe one time and deblurs it, with its own motion, and selects its keypoints; `false` if there is
+    /// nothing to do.
+    pub(super) fn sharpen_keyframe(&mut self) -> bool {
+        self.work.image_pixels += self.pixels();
+        let Some(path) = self.keyframe.keyframe_from_camera else { return false };
+        let timing = self.keyframe.timing;
+        if timing.reaches_outside() {
+            let keyframe = &mut self.keyframe;
+            self.rectify.rectify(
+                &path,
+                &timing,
+                &self.config.camera,
+                keyframe.pyramid.levels[0].pixels,
+                &mut keyframe.depth,
+            );
+            keyframe.restart_surface();
+            keyframe.pyramid.reduce();
+        }
+        if self.deblur_keyframe(&path) {
+            return true;
+        }
+        if timing.reaches_outside() {
+            self.select_keypoints();
+        }
+        timing.reaches_outside()
+    }
+
+    /// Deblurs the keyframe with its path and selects its keypoints; `false` if it is not worth it.
+    pub(super) fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
+        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
+        if self.config.reference == ReferenceMode::Raw || !worth {
+            return false;
+        }
+        let Some(typical) = self.keyframe.depth.mean() else { return false };
+        let longest = self.deblur.flow.fill(
+            path,
+            &self.keyframe.timing,
+            &self.config.camera,
+            &self.keyframe.planes,
+            self.config.surface_level,
+            typical,
+        );
+        let image = &mut self.keyframe.pyramid.levels[0];
+        self.deblur.capture(image.pixels);
+        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
+        self.work.blur_taps += report.taps;
+        self.keyframe.pyramid.reduce();
+        self.select_keypoints();
+        true
+    }
+
+    /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
+    /// correction of the keyframe's velocity, per second in the keyframe, when it is time for one.
+    pub(super) fn observe_path_error(
+        &mut self,
+        frame: &Frame,
+        motion: &Motion,
+        world_from_mid: &RigidTransform,
+    ) -> Option<PathRate> {
+        let path_rate = motion.within_exposure.filter(|_| self.keyframe.timing.is_rolling())?;
+        let dt = frame.timestamp - motion.timestamp;
+        let next = motion.reference_from_mid.tangent_to(world_from_mid) / dt;
+        if !motion.interval.is_finite() {
+            return None;
+        }
+        let slope = (next * motion.interval + motion.between_frames * dt) / (dt + motion.interval);
+        let bend = next - motion.between_frames;
+        let between = 0.5 * (dt + motion.interval);
+        let mut sigma = self.path_sigma(MID_POSE_SHEAR, self.span);
+        for i in 0..12 {
+            let bend = bend.fixed_rows::<3>(i / 3 % 2 * 3).norm();
+            sigma[i] += if i < 6 { 0.3 * bend } else { 0.3 * bend / between };
+        }
+        let keyframe_from_world = self.keyframe.world_from_keyframe.inverse();
+        let mut difference = PathRate::zeros();
+        let velocity = rotated(&keyframe_from_world, &(path_rate - slope));
+        let acceleration = rotated(&keyframe_from_world, &(motion.acceleration - bend / between));
+        difference.fixed_rows_mut::<6>(0).copy_from(&velocity);
+        difference.fixed_rows_mut::<6>(6).copy_from(&acceleration);
+        self.path_error.observe(&difference, &sigma)
+    }
+
+    /// Standard deviations of a velocity that moves the picture by `pixels` within `span` seconds, and of an acceleration
+    /// that moves it by as much at both ends of them.
+    pub(super) fn path_sigma(&self, pixels: f64, span: f64) -> PathRate {
+        let span = span.max(1e-6);
+        let angle = pixels / self.config.camera.fx / span;
+        let shift = angle / typical_inverse_depth(self.keyframe.finest_keypoints()).max(0.02);
+        PathRate::from_fn(|i, _| {
+            let of_velocity = if i / 3 % 2 == 0 { shift } else { angle };
+            if i < 6 { of_velocity } else { of_velocity * 8.0 / span }
+        })
+    }
+
+    /// Changes the keyframe's velocity by `correction` and shears picture and depth anew.
+    pub(super) fn correct_keyframe_path(&mut self, correction: &PathRate) {
+        let Some(old) = self.keyframe.keyframe_from_camera else { return };
+        let span = self.keyframe_span;
+        let motion = old.linear.motion() + correction.fixed_rows::<6>(0) * span;
+        let bow = old.bow + correction.fixed_rows::<6>(6) * (0.5 * span * span);
+        let mid = RigidTransform::identity();
+        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), bow };
+        let depth_time = 0.5 + self.keyframe.timing.depth_time;
+        let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
+        self.keyframe.keyframe_from_camera = Some(path);
+        self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
+        self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
+        self.keyframe.refit_surface();
+        let pixels = &mut *self.keyframe.pyramid.levels[0].pixels;
+        self.rectify.rectify_image(
+            &path,
+            &self.keyframe.timing,
+            &self.config.camera,
+            pixels,
+            &self.keyframe.depth,
+        );
+        self.keyframe.pyramid.reduce();
+        if !self.deblur_keyframe(&path) {
+            self.select_keypoints();
+        }
+    }
+
+    pub(super) fn select_keypoints(&mut self) {
+        self.keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
+    }
+
+    /// Remembers the coarse part of the keyframe for recovery before it is replaced.
+    pub(super) fn keep_keyframe(&mut self) {
+        self.recent.remember(&self.keyframe, self.config.surface_level);
+    }
+}

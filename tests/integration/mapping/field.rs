@@ -23,6 +23,9 @@ fn a_field_is_sharp_where_frames_are_blurred_and_keeps_the_middles() {
     let settings = MapSettings { kind: MapKind::Field, ..MapSettings::default() };
     std::fs::create_dir_all(sequence.path("mapped")).unwrap();
     std::fs::write(sequence.path("mapped").join(MAP_FILE), "an earlier map").unwrap();
+    // What makes the folder that of a run.
+    let summary = r#"{"format": 1, "complete": true, "program": "mba", "frames": {}}"#;
+    std::fs::write(sequence.path("mapped").join("summary.json"), summary).unwrap();
     let summary = sequence.map(&run, "mapped", &settings);
     let figures = summary.map.expect("figures of the map");
     println!("{figures:?}");

@@ -66,7 +66,7 @@ pub(super) fn parabola(points: &[(f64, f64)]) -> Option<Parabola> {
         right += row(*x) * *y;
     }
     let solution = matrix.lu().solve(&right)?;
-    if !(solution.z > 0.0) {
+    if solution.z.is_nan() || solution.z <= 0.0 {
         return None;
     }
     let squares: f64 = points.iter().map(|(x, y)| (row(*x).dot(&solution) - y).powi(2)).sum();

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::brightness::relative_brightness;
 use super::exposure::{self, PixelScale};
 use super::robust::Spread;
-use super::score::{advantage, misfits, parabola, trimmed_mean};
+use super::score::{Parabola, advantage, misfits, parabola, trimmed_mean};
 use super::window::{Guess, Tracked, Window};
 use crate::dataset::{Dataset, LONGEST_ASSUMED_EXPOSURE};
 use crate::tracking::TrackingOptions;
@@ -20,10 +20,13 @@ const EXPOSURE_SHARES: [f64; 2] = [1.0, 0.5];
 /// Steps around the best readout that are tried next, seconds; the second time around the bottom of the parabola.
 const REFINEMENTS: [[f64; 4]; 2] = [[-0.006, -0.003, 0.003, 0.006], [-0.004, -0.002, 0.002, 0.004]];
 
-/// A readout is believed when it explains the frames better than none by this many standard deviations, and by this
-/// share of the residual.
+/// A readout is believed when it differs from none, and explains the frames better than none, by this many standard
+/// deviations, and by this share of the residual.
 const MIN_CERTAINTY: f64 = 3.0;
 const MIN_GAIN: f64 = 0.03;
+
+/// Stretches of frames that are left out in turn to see how certain a readout is.
+const BLOCKS: usize = 5;
 
 /// Rounds after which the exposure time agrees with the motion, and the change that is no more than noise.
 const EXPOSURE_ROUNDS: usize = 4;
@@ -121,22 +124,48 @@ impl Search<'_> {
             guesses.push(Guess { readout: 0.0, ..around.clone() });
             let mut probes = self.probe(guesses);
             let none = probes.pop()?;
-            let mut points: Vec<(f64, f64)> =
-                probes.iter().map(|probe| (probe.guess.readout, probe.height())).collect();
-            points.push((around.readout, best.height()));
-            let lowest = points.iter().copied().min_by(|a, b| a.1.total_cmp(&b.1))?;
+            probes.push(best.clone());
+            let lowest = probes.iter().min_by(|a, b| a.height().total_cmp(&b.height()))?.guess.readout;
             let reach = steps[3];
-            let bottom = parabola(&points);
-            let place =
-                bottom.map_or(lowest.0, |p| p.bottom.clamp(around.readout - reach, around.readout + reach));
-            // Places beyond half a step cannot be told apart where the points show no parabola.
-            let sigma = bottom.map_or(reach, |p| p.sigma.max(0.1 * reach));
+            let bounds = (around.readout - reach, around.readout + reach);
+            let bottom = bottom_of(&probes, bounds, |_| true);
+            let place = bottom.map_or(lowest, |p| p.bottom);
+            // Places beyond the steps cannot be told apart where the points show no parabola.
+            let of_points = bottom.map_or(reach, |p| p.sigma.max(0.1 * reach));
+            let sigma = of_points.hypot(spread_over_blocks(&probes, bounds));
             let gain = advantage(&best.misfits, &none.misfits)?;
             found = Some(Readout { seconds: place, sigma, gain });
             best = self.probe(vec![Guess { readout: place, ..around }]).pop()?;
         }
         found
     }
+}
+
+/// Where the parabola through the misfits of the frames that `takes_part` (by number) is lowest, within `bounds`.
+fn bottom_of(probes: &[Probe], bounds: (f64, f64), takes_part: impl Fn(usize) -> bool) -> Option<Parabola> {
+    let height = |probe: &Probe| {
+        let frames = probe.misfits.iter().enumerate().filter(|(k, _)| takes_part(*k));
+        trimmed_mean(&frames.map(|(_, misfit)| *misfit).collect::<Vec<_>>()).map(|mean| mean.median)
+    };
+    let points: Option<Vec<(f64, f64)>> =
+        probes.iter().map(|probe| Some((probe.guess.readout, height(probe)?))).collect();
+    let found = parabola(&points?)?;
+    Some(Parabola { bottom: found.bottom.clamp(bounds.0, bounds.1), ..found })
+}
+
+/// Standard deviation of the bottom by how much it changes when one stretch of frames is left out (the jackknife; frames of
+/// a stretch share a keyframe, and what is wrong with it). The width of the bounds where there is no bottom without one.
+fn spread_over_blocks(probes: &[Probe], bounds: (f64, f64)) -> f64 {
+    let frames = probes.iter().map(|probe| probe.misfits.len()).min().unwrap_or(0);
+    let length = frames.div_ceil(BLOCKS).max(1);
+    let bottoms: Option<Vec<f64>> = (0..BLOCKS)
+        .map(|block| bottom_of(probes, bounds, |k| k / length != block).map(|found| found.bottom))
+        .collect();
+    let Some(bottoms) = bottoms else { return bounds.1 - bounds.0 };
+    let count = BLOCKS as f64;
+    let mean = bottoms.iter().sum::<f64>() / count;
+    let squares: f64 = bottoms.iter().map(|bottom| (bottom - mean).powi(2)).sum();
+    ((count - 1.0) / count * squares).sqrt()
 }
 
 /// A readout time.
@@ -153,7 +182,8 @@ pub(super) struct Readout {
 impl Readout {
     /// Whether the recording tells it from none.
     pub(super) fn is_certain(&self) -> bool {
-        self.gain.median > MIN_GAIN && self.gain.median > MIN_CERTAINTY * self.gain.sigma
+        let explains_more = self.gain.median > MIN_GAIN && self.gain.median > MIN_CERTAINTY * self.gain.sigma;
+        explains_more && self.seconds.abs() > MIN_CERTAINTY * self.sigma
     }
 }
 

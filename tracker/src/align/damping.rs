@@ -22,6 +22,9 @@ const HOPELESS: f64 = 1e4;
 
 impl Damping {
     /// Solves `(H + mu diag(H)) step = -g`, always from the undamped matrix. `None` when that is singular.
+    ///
+    /// Not inlined: the copies of the matrix are off the stack again when the step is evaluated.
+    #[inline(never)]
     pub(super) fn step(
         &self,
         hessian: &SMatrix<f64, BOWED_UNKNOWNS, BOWED_UNKNOWNS>,

@@ -150,7 +150,8 @@ impl Alignment<'_> {
     }
 
     /// Places the patches at the current estimate and measures noise and outliers; returns the objective without
-    /// its sites and their number.
+    /// its sites and their number. Not inlined: its stack must be free again when steps are tried out.
+    #[inline(never)]
     fn place(
         &self,
         plan: &LevelPlan,
@@ -300,7 +301,9 @@ fn exposure_of(estimate: &Estimate, timing: &FrameTiming) -> ExposureTrajectory 
     }
 }
 
-/// The Gauss-Newton matrix of the other unknowns when the bow may take any value: the Schur complement of its block.
+/// The Gauss-Newton matrix of the other unknowns when the bow may take any value: the Schur complement of its block. Not
+/// inlined, for the sake of the stack.
+#[inline(never)]
 fn without_bow(hessian: &SMatrix<f64, BOWED_UNKNOWNS, BOWED_UNKNOWNS>) -> SMatrix<f64, UNKNOWNS, UNKNOWNS> {
     const BOW: usize = BOWED_UNKNOWNS - UNKNOWNS;
     let others = hessian.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into_owned();

@@ -55,6 +55,8 @@ pub enum Command {
     Synth(synth::Synth),
     /// Show what a data set holds, lacks and what is odd about it
     Info(Info),
+    /// Find what is not on record about the camera from the recording itself
+    Calibrate(Calibrate),
     /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
     Track(Track),
     /// Make a sharp map of a tracked data set, refine all poses and deblur keyframes
@@ -108,6 +110,28 @@ pub struct Info {
     pub dataset: PathBuf,
 }
 
+/// Arguments of `mba calibrate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Exposure and readout times that are not on record are estimated, each with a standard deviation; what the recording \
+cannot tell is said to be unknown. FILE is a calibration.toml with what was found; exposure times of single frames go \
+beside it, into exposures.csv for a FILE of that name.
+
+Examples:
+  mba calibrate data
+  mba calibrate data --focal-length --out found/calibration.toml")]
+pub struct Calibrate {
+    /// Folder of the data set
+    #[arg(value_name = "DATASET")]
+    pub dataset: PathBuf,
+    /// Calibration to write; default: only print
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Look for the focal length, too, around the one on record
+    #[arg(long)]
+    pub focal_length: bool,
+}
+
 /// Arguments of `mba track`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -151,6 +175,9 @@ pub struct Tracking {
     /// Write the deblurred image of every keyframe, after the last frame
     #[arg(long, value_enum, default_value_t)]
     pub keyframes: Switch,
+    /// Find exposure and readout times that are not on record from the recording first, or assume the usual
+    #[arg(long, value_enum, default_value_t)]
+    pub self_calibrate: Switch,
 }
 
 /// Values of `--blur`.

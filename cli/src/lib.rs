@@ -61,6 +61,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Demo(args) => commands::demo::run(args, console),
         Command::Synth(args) => commands::synth::run(args, console),
         Command::Info(args) => commands::info::run(args, console),
+        Command::Calibrate(args) => commands::calibrate::run(args, console),
         Command::Track(args) => commands::track::run(args, console),
         Command::Map(args) => commands::map::run(args, console),
         Command::Slam(args) => commands::slam::run(args, console),

@@ -3,6 +3,8 @@
 //! A [`dataset`], recorded or made by [`synth`], is tracked by [`tracking`] into a [`run`]: poses of every frame at
 //! opening, middle and closing of the shutter, and keyframes that [`deblurring`] inverts.
 //!
+//! What is not on record about the camera is found by [`self_calibration`], which tracks again and again.
+//!
 //! [`mapping`] goes on from there. [`continuity`] repairs exposures that do not fit their neighbours; [`bundle`] seeds
 //! [`gaussians`] from depth and adjusts them together with the path of every exposure. A step renders what the moving
 //! camera sees ([`exposure`], the mean of views of [`raster`]), compares it with the captured frame ([`losses`]) and
@@ -37,6 +39,7 @@ pub mod pose_graph;
 pub mod raster;
 pub mod rendering;
 pub mod run;
+pub mod self_calibration;
 pub mod slam;
 pub mod surfaces;
 pub mod synth;

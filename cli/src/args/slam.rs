@@ -81,6 +81,9 @@ pub struct Slamming {
     /// Seed of the choice of keyframes to visit
     #[arg(long, value_name = "N", default_value_t = SlamSettings::default().seed)]
     pub seed: u64,
+    /// Find exposure and readout times that are not on record from the recording first, or assume the usual
+    #[arg(long, value_enum, default_value_t)]
+    pub self_calibrate: Switch,
     /// What can be left out.
     #[command(flatten)]
     pub ablation: Ablation,
@@ -158,6 +161,7 @@ impl Default for Slamming {
             max_gaussians: None,
             checkpoint_interval: SlamSettings::default().checkpoint_interval,
             seed: SlamSettings::default().seed,
+            self_calibrate: Switch::default(),
             ablation: Ablation::default(),
         }
     }

@@ -3,7 +3,7 @@
 use mba_mapper::run::{Run, Summary};
 use serde::Serialize;
 
-use super::{open, slam};
+use super::{calibrate, open, slam};
 use crate::args::slam::{Ablate, Ablation, MapReference, Slamming};
 use crate::args::{BlurMode, Switch};
 use crate::console::Console;
@@ -29,7 +29,7 @@ struct Row {
 /// # Errors
 /// As `mba slam`.
 pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
-    let dataset = open::dataset(&args.dataset)?;
+    let dataset = calibrate::completed(open::dataset(&args.dataset)?, Switch::On, console)?;
     let mut rows = Vec::new();
     for (name, ablation) in variants() {
         let out = args.out.join(name.replace(' ', "-"));

@@ -8,8 +8,8 @@ use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
 use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
-use super::open;
 use super::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
+use super::{calibrate, open};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
@@ -26,6 +26,7 @@ const PROGRESS_STEPS: usize = 1000;
 pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let run = open::run(&args.trajectory)?;
+    let dataset = open::with_estimates(dataset, &run)?;
     let summary = map_into(&dataset, &run, &args.out, args.force, &args.mapping, args.resume, console)?;
     console.result(&summary, table::summary)
 }
@@ -59,6 +60,7 @@ pub fn map_into(
         return Err(interrupted(message, format!("`{}` goes on", interrupt::command_to_go_on(true))));
     }
     let summary = mapped.or_else(|error| advise(error, run))?;
+    calibrate::keep(dataset, out)?;
     announce(&summary, out, console);
     Ok(summary)
 }

@@ -2,6 +2,7 @@
 
 pub mod ablate;
 pub mod alignment;
+pub mod calibrate;
 mod camera_facts;
 pub mod demo;
 pub mod eval_images;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
 use mba_mapper::run::{FIELD_FILE, MAP_FILE, Run, RunError, StoredMap};
+use mba_mapper::self_calibration::read_back;
 
 use crate::failure::{OrBadInput, bad_input};
 
@@ -25,6 +26,14 @@ pub fn run(folder: &Path) -> anyhow::Result<Run> {
         _ => "track the sequence again, or restore the file",
     };
     Run::open(folder).map_err(|error| (hint(&error), error)).or_else(advise)
+}
+
+/// The data set with what the run found about its camera.
+///
+/// # Errors
+/// Bad input with advice.
+pub fn with_estimates(dataset: Dataset, run: &Run) -> anyhow::Result<Dataset> {
+    read_back(&run.folder, dataset).or_bad_input("track the sequence again, or restore the file")
 }
 
 /// Reads the map of a run.

@@ -11,7 +11,7 @@ use mba_mapper::tracking::TrackingError;
 use serde_json::json;
 
 use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
-use super::{open, outcome};
+use super::{calibrate, open, outcome};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
@@ -33,6 +33,7 @@ pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
         let hint = "correct the timestamps, or leave --realtime out";
         return Err(bad_input(format!("frames cannot come by their times: {warning}"), hint));
     }
+    let dataset = calibrate::completed(dataset, args.slamming.self_calibrate, console)?;
     let summary = slam_into(&dataset, &args.out, (args.force, args.resume), &args.slamming, console)?;
     console.result(&summary, table::summary)
 }
@@ -76,6 +77,7 @@ pub fn slam_into(
         return Err(interrupted(message, format!("`{command}` {goes_on}")));
     }
     let summary = finished.or_else(|error| advise(error, dataset))?;
+    calibrate::keep(dataset, out)?;
     announce(&summary, out, console);
     outcome::check(&summary, dataset, console)?;
     Ok(summary)

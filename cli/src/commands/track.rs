@@ -8,9 +8,8 @@ use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
-use super::open;
-use super::outcome;
 use super::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
+use super::{calibrate, open, outcome};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;
 use crate::failure::{OrBadInput, interrupted};
@@ -23,6 +22,7 @@ use crate::report::table;
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
 pub fn run(args: &Track, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
+    let dataset = calibrate::completed(dataset, args.tracking.self_calibrate, console)?;
     let summary = track_into(&dataset, &args.out, args.force, &args.tracking, console)?;
     console.result(&summary, table::summary)
 }
@@ -63,6 +63,7 @@ pub fn track_into(
         return Err(outcome::failure(dataset, "; the earlier run in the folder stays"));
     }
     writer.replace_earlier()?;
+    calibrate::keep(dataset, out)?;
     if args.keyframes == Switch::On {
         deblur_keyframes(dataset, args, &mut writer, console)?;
     }

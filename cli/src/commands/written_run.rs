@@ -53,12 +53,14 @@ pub fn output_hint(error: &OutputError) -> &'static str {
 /// The settings of a run on `dataset`; `options` is an object.
 #[must_use]
 pub fn settings(dataset: &Dataset, options: &Value) -> RunSettings {
+    let mut options = options.as_object().cloned().unwrap_or_default();
+    options.insert("calibration".to_owned(), json!(dataset.calibration().sources));
     RunSettings {
         program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
         dataset: absolute(dataset.folder()),
         frame_rate: dataset.calibration().frame_rate,
         camera: Some(RunCamera::from(dataset.calibration())),
-        options: options.as_object().cloned().unwrap_or_default(),
+        options,
     }
 }
 

@@ -4,7 +4,7 @@ use mba_tracker::geometry::{Distortion, PinholeCamera};
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::{Matrix3, Rotation3};
 
-use super::knowledge::{CalibrationSources, Knowledge};
+use super::knowledge::{CalibrationSources, CameraFact, Knowledge};
 use super::vignetting::Vignetting;
 
 /// Everything known about the camera of a data set.
@@ -189,6 +189,35 @@ impl Calibration {
         self.readout = Readout::Rolling { seconds: None };
         self.sources.readout = Knowledge::Recorded;
         self
+    }
+
+    /// Takes over one fact, and how it came to be known, from another calibration of the same camera. Exposure times of
+    /// single frames are not part of a calibration.
+    pub(crate) fn take(&mut self, fact: CameraFact, other: &Self) {
+        let sources = &other.sources;
+        match fact {
+            CameraFact::Camera => {
+                (self.camera, self.distortion) = (other.camera, other.distortion);
+                self.sources.camera = sources.camera;
+            }
+            CameraFact::DepthScale => {
+                (self.depth_scale, self.sources.depth_scale) = (other.depth_scale, sources.depth_scale);
+            }
+            CameraFact::Exposure => {
+                (self.exposure, self.sources.exposure) = (other.exposure, sources.exposure);
+            }
+            CameraFact::Readout => (self.readout, self.sources.readout) = (other.readout, sources.readout),
+            CameraFact::Response => {
+                (self.response, self.sources.response) = (other.response.clone(), sources.response);
+            }
+            CameraFact::Vignetting => {
+                (self.vignetting, self.sources.vignetting) = (other.vignetting, sources.vignetting);
+            }
+            CameraFact::DepthDelay => {
+                self.depth_delay_seconds = other.depth_delay_seconds;
+                self.sources.depth_delay = sources.depth_delay;
+            }
+        }
     }
 
     /// Exposure time of a frame that has none of its own, seconds.

@@ -27,7 +27,7 @@ pub(super) fn read(
     if !path.is_file() {
         return Ok(false);
     }
-    let (times, exposures) = read_rows(&path)?;
+    let (times, exposures) = read_exposure_times(&path)?;
     let frame_times: Vec<f64> = entries.iter().map(|entry| entry.timestamp).collect();
     for (frame, row) in associate(&frame_times, &times, 0.5 / calibration.frame_rate) {
         entries[frame].exposure_seconds = Some(exposures[row]);
@@ -41,8 +41,12 @@ pub(super) fn read(
     Ok(true)
 }
 
-/// Timestamps and exposure times in seconds.
-fn read_rows(path: &Path) -> Result<(Vec<f64>, Vec<f64>), FileError> {
+/// Reads a list of exposure times: timestamps and exposure times in seconds, in order.
+///
+/// # Errors
+///
+/// [`FileError`] if the file is unreadable or malformed.
+pub fn read_exposure_times(path: &Path) -> Result<(Vec<f64>, Vec<f64>), FileError> {
     let file = TextFile::read(path)?;
     let mut lines = file.lines();
     let columns = match lines.next() {

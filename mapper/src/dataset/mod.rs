@@ -48,7 +48,7 @@ pub use calibration::{
 pub(crate) use calibration::{MAX_PIXELS, check_camera, check_positive};
 pub use calibration_text::write_calibration;
 pub use error::{DatasetError, FrameError, Warning};
-pub use exposure_list::write_exposure_times;
+pub use exposure_list::{read_exposure_times, write_exposure_times};
 pub use frame::RgbdFrame;
 pub use frame::read_image;
 pub use knowledge::{CalibrationSources, CameraFact, Knowledge};

@@ -7,7 +7,9 @@ use mba_tracker::image::{
     PixelRectangle, SourcePosition, fill_source_map, region_with_source, remap_bilinear, remap_nearest,
 };
 
-use super::calibration::{ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, check_exposure};
+use super::calibration::{
+    ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, assumed_exposure_seconds, check_exposure,
+};
 use super::frame::{image_size, read_colour, read_depth};
 use super::vignetting::falloff_of_pixels;
 use super::{
@@ -333,7 +335,9 @@ impl Dataset {
         self.warnings.extend(find_other_unit(&times));
         self.warnings.extend(find_gaps(&times));
         if let ExposureSource::Assumed { seconds } = self.calibration.exposure {
-            let why = if seconds < LONGEST_ASSUMED_EXPOSURE {
+            let why = if seconds < assumed_exposure_seconds(frame_rate) {
+                "every frame is taken for sharp".to_owned()
+            } else if seconds < LONGEST_ASSUMED_EXPOSURE {
                 format!("{ASSUMED_EXPOSURE_SHARE} of the frame interval")
             } else {
                 "the longest that is assumed".to_owned()

@@ -10,5 +10,6 @@ mod recovery;
 mod reference_view;
 mod rolling;
 mod scenes;
+mod self_calibration;
 mod sequences;
 mod work;

@@ -1,0 +1,105 @@
+//! `mba calibrate`, and calibrating by the way in the commands that track.
+
+use std::path::Path;
+
+use mba_mapper::dataset::{
+    Calibration, CalibrationSources, Dataset, ExposureSource, Knowledge, write_calibration,
+    write_exposure_times,
+};
+use mba_mapper::self_calibration::{self, Finding};
+use serde::Serialize;
+
+use super::open;
+use super::written_run::note_written;
+use crate::args::{Calibrate, Switch};
+use crate::console::Console;
+use crate::failure::OrBadInput;
+
+/// What the command prints.
+#[derive(Debug, Serialize)]
+struct Result {
+    /// What was looked for.
+    findings: Vec<Finding>,
+    /// How each fact came to be known, afterwards.
+    sources: CalibrationSources,
+}
+
+/// Finds what is not on record, prints it and writes a calibration if asked to.
+///
+/// # Errors
+/// Bad input when the data set cannot be used or the file not be written.
+pub fn run(args: &Calibrate, console: &Console) -> anyhow::Result<()> {
+    let recorded = open::dataset(&args.dataset)?;
+    let (mut dataset, mut findings) = self_calibration::complete(recorded)?;
+    if args.focal_length {
+        let (finding, factor) = self_calibration::focal_length(&dataset);
+        findings.push(finding);
+        if let Some(factor) = factor {
+            let calibration = refocused(dataset.calibration(), factor);
+            dataset = dataset.with_calibration(calibration)?;
+        }
+    }
+    if let Some(path) = &args.out {
+        write(path, &dataset).or_bad_input("name a file for --out in a folder that exists")?;
+        note_written(path, console);
+    }
+    let result = Result { findings, sources: dataset.calibration().sources };
+    console.result(&result, table)
+}
+
+fn refocused(calibration: &Calibration, factor: f64) -> Calibration {
+    let mut calibration = calibration.clone();
+    calibration.camera.fx *= factor;
+    calibration.camera.fy *= factor;
+    calibration.sources.camera = Knowledge::Estimated;
+    calibration
+}
+
+/// The calibration and, beside it, the exposure times of single frames; those on record stay where they are.
+fn write(path: &Path, dataset: &Dataset) -> std::result::Result<(), mba_mapper::FileError> {
+    write_calibration(path, dataset.calibration())?;
+    let calibration = dataset.calibration();
+    let is_estimated = calibration.sources.exposure == Knowledge::Estimated;
+    if calibration.exposure != ExposureSource::PerFrame || !is_estimated {
+        return Ok(());
+    }
+    let times: Vec<(f64, f64)> =
+        (0..dataset.len()).map(|index| (dataset.timestamp(index), dataset.exposure_seconds(index))).collect();
+    write_exposure_times(&path.with_file_name("exposures.csv"), &times)
+}
+
+fn table(result: &Result) -> String {
+    if result.findings.is_empty() {
+        return "exposure and readout times are on record".to_owned();
+    }
+    result.findings.iter().map(|finding| format!("{finding}\n")).collect()
+}
+
+/// The data set with exposure and readout times that are not on record, found from the recording itself unless that is
+/// switched off; says what was found.
+///
+/// # Errors
+/// As [`self_calibration::complete`].
+pub fn completed(dataset: Dataset, switch: Switch, console: &Console) -> anyhow::Result<Dataset> {
+    if switch == Switch::Off || self_calibration::is_complete(&dataset) {
+        return Ok(dataset);
+    }
+    console.detail("looking for what is not on record about the camera");
+    let (dataset, findings) = self_calibration::complete(dataset)?;
+    let found: Vec<String> = findings.iter().map(ToString::to_string).collect();
+    console.note(format!("found from the recording: {}", found.join("; ")));
+    Ok(dataset)
+}
+
+/// Keeps in the RUN folder `out` what was found about the camera, in place of what an earlier run found.
+///
+/// # Errors
+/// When the files cannot be written.
+pub fn keep(dataset: &Dataset, out: &Path) -> anyhow::Result<()> {
+    if self_calibration::has_estimates(dataset) {
+        self_calibration::write(out, dataset)?;
+    } else {
+        self_calibration::remove(out)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,199 @@
+//! Exposure time from motion: what moved within an exposure, over the velocity that the poses around it give.
+
+use mba_tracker::geometry::PinholeCamera;
+use nalgebra::Vector6;
+
+use super::robust::{Spread, median, spread};
+use super::window::Tracked;
+
+/// Longest gap between neighbours whose poses tell a velocity, seconds: three frames of a video.
+const MAX_GAP: f64 = 0.11;
+
+/// Least motion from frame to frame, pixels, for a frame to say anything: its blur is then about as long as the
+/// uncertainty of a path.
+const MIN_MOTION_PX: f64 = 3.0;
+
+/// Fewest frames with enough motion.
+const MIN_FRAMES: usize = 5;
+
+/// Two exposure times tell a power when their logarithms are this far apart, and half of the frames when this many pairs
+/// of them do.
+const MIN_LOG_STEP: f64 = 0.1;
+const MIN_SLOPES: usize = 20;
+
+/// Powers between an assumed and a usual response, and how far two halves of the frames may differ.
+const POWERS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
+const MAX_CONTRADICTION: f64 = 0.5;
+
+/// Turns motions (translation in metres, rotation in radians) into pixels at a typical depth.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PixelScale {
+    /// Pixels per radian.
+    pub(super) focal: f64,
+    /// Metres.
+    pub(super) depth: f64,
+}
+
+impl PixelScale {
+    pub(super) fn new(camera: &PinholeCamera, depth: f64) -> Self {
+        Self { focal: 0.5 * (camera.fx + camera.fy), depth }
+    }
+
+    fn pixels(&self, motion: &Vector6<f64>) -> Vector6<f64> {
+        let metre = self.focal / self.depth;
+        Vector6::from_fn(|i, _| motion[i] * if i < 3 { metre } else { self.focal })
+    }
+}
+
+/// Velocity at frame `index` of `tracked`, per second in its own axes: the derivative of the polynomial through the
+/// poses at mid exposure of two frames on either side, of one where there are no two.
+///
+/// Three points would be too few: with a hand that shakes at 4 Hz, a difference over two intervals of 1/30 s is
+/// 11 % too short, the polynomial of five points 2 %.
+pub(super) fn velocity(tracked: &[Tracked], index: usize) -> Option<Vector6<f64>> {
+    let centre = &tracked[index];
+    let near = |other: &Tracked, frames: f64| {
+        other.is_found && (other.timestamp - centre.timestamp).abs() <= frames * MAX_GAP
+    };
+    let side = |reach: usize| {
+        let (first, last) = (index.checked_sub(reach)?, index + reach);
+        let stretch = tracked.get(first..=last)?;
+        stretch.iter().all(|other| near(other, reach as f64)).then_some(stretch)
+    };
+    let stretch = side(2).or_else(|| side(1))?;
+    let times: Vec<f64> = stretch.iter().map(|other| other.timestamp - centre.timestamp).collect();
+    // Derivative at time 0 of the Lagrange polynomial of each point; that of the middle point has value 0 there.
+    let weight = |j: usize| {
+        let others = || (0..times.len()).filter(|&k| k != j);
+        let denominator: f64 = others().map(|k| times[j] - times[k]).product();
+        let numerator: f64 = others().filter(|&k| times[k] != 0.0).map(|k| -times[k]).product();
+        numerator / denominator
+    };
+    let mut sum = Vector6::zeros();
+    for (j, other) in stretch.iter().enumerate().filter(|(j, _)| times[*j] != 0.0) {
+        sum += centre.world_from_mid.tangent_to(&other.world_from_mid) * weight(j);
+    }
+    Some(sum)
+}
+
+/// Exposure times that single frames tell, seconds, with the pixels that the picture moves between two frames.
+pub(super) fn observations(tracked: &[Tracked], scale: &PixelScale, interval: f64) -> Vec<(usize, f64, f64)> {
+    let observe = |k: usize| {
+        let frame = &tracked[k];
+        let rate = scale.pixels(&velocity(tracked, k).filter(|_| frame.is_found)?);
+        let motion = interval * rate.norm();
+        let within = scale.pixels(&frame.world_from_camera.motion());
+        (motion >= MIN_MOTION_PX).then(|| (frame.index, within.dot(&rate) / rate.norm_squared(), motion))
+    };
+    (0..tracked.len()).filter_map(observe).collect()
+}
+
+/// The factor on all of `exposures` (of the data set's frames, seconds) that makes them agree with the motion.
+pub(super) fn factor(observations: &[(usize, f64, f64)], exposures: &[f64]) -> Option<Spread> {
+    if observations.len() < MIN_FRAMES {
+        return None;
+    }
+    let ratios: Vec<f64> =
+        observations.iter().map(|(index, seconds, _)| seconds / exposures[*index]).collect();
+    spread(&ratios)
+}
+
+/// The power of `exposures` that the motion follows, where their ratios come from brightness through an assumed response.
+/// A response is known up to a power as long as no exposure times are; motion tells them.
+///
+/// The median of the slopes between all pairs of frames on logarithmic axes, after Theil and Sen. None where exposures
+/// hardly vary, or where one half of the frames contradicts the other.
+pub(super) fn power(observations: &[(usize, f64, f64)], exposures: &[f64]) -> Option<f64> {
+    let point = |(index, seconds, _): &(usize, f64, f64)| (exposures[*index].ln(), seconds.max(1e-4).ln());
+    let points: Vec<(f64, f64)> = observations.iter().map(point).collect();
+    let slope = |points: &[(f64, f64)]| {
+        let pairs = points.iter().enumerate().flat_map(|(k, a)| points[..k].iter().map(move |b| (a, b)));
+        let slopes: Vec<f64> = pairs
+            .filter(|(a, b)| (a.0 - b.0).abs() > MIN_LOG_STEP)
+            .map(|(a, b)| (a.1 - b.1) / (a.0 - b.0))
+            .collect();
+        if slopes.len() < MIN_SLOPES { None } else { median(&slopes) }
+    };
+    let half = |which: usize| points.iter().skip(which).step_by(2).copied().collect::<Vec<_>>();
+    let (even, odd) = (slope(&half(0))?, slope(&half(1))?);
+    let found = slope(&points)?;
+    let is_certain = POWERS.contains(&found) && (even - odd).abs() < MAX_CONTRADICTION;
+    is_certain.then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use mba_tracker::geometry::RigidTransform;
+    use mba_tracker::trajectory::ExposureTrajectory;
+
+    use super::*;
+
+    const SCALE: PixelScale = PixelScale { focal: 500.0, depth: 2.0 };
+    const INTERVAL: f64 = 1.0 / 30.0;
+
+    /// A hand that shakes at 3 Hz; exposures last 9 ms.
+    fn pose(t: f64) -> RigidTransform {
+        let phase = std::f64::consts::TAU * 3.0 * t;
+        let motion = Vector6::new(0.02 * phase.cos(), 0.0, 0.01, 0.0, 0.05 * phase.sin(), 0.0);
+        RigidTransform::identity().perturbed(&motion)
+    }
+
+    fn shaken(frames: usize) -> Vec<Tracked> {
+        let frame = |index: usize| {
+            let timestamp = index as f64 * INTERVAL;
+            Tracked {
+                index,
+                timestamp,
+                is_found: true,
+                world_from_mid: pose(timestamp),
+                world_from_camera: ExposureTrajectory {
+                    start: pose(timestamp - 0.0045),
+                    end: pose(timestamp + 0.0045),
+                },
+                reference: 0,
+                gain: 1.0,
+                residual: 1.0,
+            }
+        };
+        (0..frames).map(frame).collect()
+    }
+
+    #[test]
+    fn exposure_time_follows_from_motion_whatever_was_assumed() {
+        let tracked = shaken(40);
+        let observations = observations(&tracked, &SCALE, INTERVAL);
+        for assumed in [0.005, 0.0166] {
+            let factor = factor(&observations, &[assumed; 40]).unwrap();
+            let seconds = factor.median * assumed;
+            assert!((seconds - 0.009).abs() < 1e-4, "{seconds}");
+        }
+    }
+
+    #[test]
+    fn lost_neighbours_and_stillness_say_nothing() {
+        let mut tracked = shaken(5);
+        assert!(velocity(&tracked, 2).is_some());
+        tracked[3].is_found = false;
+        assert!(velocity(&tracked, 2).is_none());
+        assert!(velocity(&tracked, 0).is_none(), "no frame before the first");
+        let still: Vec<Tracked> = shaken(20)
+            .into_iter()
+            .map(|frame| Tracked { world_from_mid: RigidTransform::identity(), ..frame })
+            .collect();
+        let observations = observations(&still, &SCALE, INTERVAL);
+        assert_eq!(observations.len(), 0);
+        assert!(factor(&observations, &[0.01; 20]).is_none());
+    }
+
+    #[test]
+    fn motion_tells_the_power_of_a_response() {
+        // Brightness through a wrong response: true times are the 1.4th power of what it says.
+        let exposures: Vec<f64> = (0..30).map(|k| 0.006 * 1.03_f64.powi(k)).collect();
+        let seconds = |k: usize| 3.0 * exposures[k].powf(1.4) * if k % 7 == 3 { 0.3 } else { 1.0 };
+        let observations: Vec<(usize, f64, f64)> = (0..30).map(|k| (k, seconds(k), 10.0)).collect();
+        let found = power(&observations, &exposures).unwrap();
+        assert!((found - 1.4).abs() < 1e-6, "{found}");
+        assert_eq!(power(&observations, &[0.01; 30]), None, "all alike");
+        assert_eq!(power(&observations[..6], &exposures), None, "too few");
+    }
+}

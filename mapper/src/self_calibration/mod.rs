@@ -1,0 +1,27 @@
+//! What is not on record about a camera, found from the recording itself.
+//!
+//! Exposure times follow from motion: what moves within an exposure, over the velocity between the poses at mid exposure.
+//! They are tied to each other by the brightness of the frames. The readout time of a camera whose rows are exposed one
+//! after the other is the one that explains the frames best. Far from the truth nothing fits, so a stretch of the
+//! recording is tracked again and again with supposed values. What a recording cannot tell is said to be unknown.
+//!
+//! Sources: exposure from blur, e.g. Gong et al. (CasualHDRSplat), 2025; readout as an unknown of the camera, e.g. Kerl,
+//! Stueckler and Cremers, ICCV 2015.
+
+mod brightness;
+mod complete;
+mod exposure;
+mod finding;
+mod focal;
+mod robust;
+mod score;
+mod search;
+mod stored;
+mod window;
+
+pub use complete::{complete, is_complete};
+pub use finding::{Finding, Value};
+pub use focal::focal_length;
+pub use stored::{
+    ESTIMATED_EXPOSURES_FILE, ESTIMATED_FILE, StoredError, has_estimates, read_back, remove, write,
+};

@@ -76,6 +76,9 @@ pub struct Synth {
     /// How much later than colour depth is measured, in seconds
     #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
     pub depth_delay: f64,
+    /// Time from the first row of depth to the last, in seconds; 0: all are measured together
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    pub depth_readout: f64,
     /// Exposure times that follow the brightness of the frame before, 7/16 to 18/16 of --exposure; the gain stays
     #[arg(long)]
     pub auto_exposure: bool,
@@ -128,6 +131,7 @@ impl Synth {
             sensor: SensorModel {
                 readout_seconds: self.readout,
                 depth_delay_seconds: self.depth_delay,
+                depth_readout_seconds: self.depth_readout,
                 auto_exposure: self.auto_exposure,
                 vignetting: self.vignetting,
                 imu: self.imu,

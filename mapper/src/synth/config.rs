@@ -53,9 +53,12 @@ pub struct SensorModel {
     /// a global shutter. At most 0.1 and the frame interval. Row v is exposed around the timestamp plus
     /// `((v + 1/2) / height - 1/2)` of it.
     pub readout_seconds: f64,
-    /// How much later than the middle of the colour image depth is measured, all rows together, seconds; from -0.2 to
+    /// How much later than the middle of the colour image the middle row of depth is measured, seconds; from -0.2 to
     /// 0.2.
     pub depth_delay_seconds: f64,
+    /// Time from the first row of depth to the last, seconds, in the limits of that of colour; 0 if all are measured
+    /// together.
+    pub depth_readout_seconds: f64,
     /// Whether exposure times follow the brightness of the frame before, between 7/16 and 18/16 of the one that is
     /// set. The gain stays, so a longer exposure is a brighter picture.
     pub auto_exposure: bool,
@@ -72,6 +75,7 @@ impl SensorModel {
     pub const IDEAL: Self = Self {
         readout_seconds: 0.0,
         depth_delay_seconds: 0.0,
+        depth_readout_seconds: 0.0,
         auto_exposure: false,
         vignetting: Vignetting::NONE,
         imu: false,
@@ -213,15 +217,14 @@ impl SynthConfig {
 
     /// Checks what differs from an ideal camera.
     fn check_sensor(&self) -> Result<(), SynthError> {
-        let SensorModel { readout_seconds, depth_delay_seconds, vignetting, .. } = self.sensor;
+        let SensorModel { readout_seconds, depth_delay_seconds, depth_readout_seconds, vignetting, .. } =
+            self.sensor;
         let longest_readout = (1.0 / self.frame_rate).min(0.1);
+        let readouts = -longest_readout..=longest_readout;
+        let of_at_most = "seconds of at most 0.1 and the frame interval, either way";
         let checks = [
-            (
-                "readout",
-                readout_seconds,
-                -longest_readout..=longest_readout,
-                "seconds of at most 0.1 and the frame interval, either way",
-            ),
+            ("readout", readout_seconds, readouts.clone(), of_at_most),
+            ("depth readout", depth_readout_seconds, readouts, of_at_most),
             ("depth delay", depth_delay_seconds, -0.2..=0.2, "-0.2 to 0.2 seconds"),
             ("least light of the fall-off", vignetting.least(), 1e-3..=1.0, "0.001 to 1"),
         ];

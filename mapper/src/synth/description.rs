@@ -14,7 +14,8 @@ use crate::dataset::{Vignetting, response_text};
 pub(super) fn calibration(sequence: &SynthSequence) -> String {
     let mut text = geometry(sequence);
     let config = sequence.config();
-    let SensorModel { readout_seconds, vignetting: Vignetting { a2, a4 }, .. } = config.sensor;
+    let SensorModel { readout_seconds, depth_readout_seconds, vignetting: Vignetting { a2, a4 }, .. } =
+        config.sensor;
     let mut line = |key: &str, value: &dyn std::fmt::Display| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "{key} = {value}");
@@ -27,6 +28,9 @@ pub(super) fn calibration(sequence: &SynthSequence) -> String {
     } else {
         line("readout", &"\"rolling\"");
         line("readout_seconds", &format!("{readout_seconds:?}"));
+    }
+    if depth_readout_seconds != 0.0 {
+        line("depth_readout_seconds", &format!("{depth_readout_seconds:?}"));
     }
     if !config.sensor.vignetting.is_none() {
         line("vignetting", &format!("[{a2:?}, {a4:?}]"));
@@ -124,8 +128,15 @@ Response {response}, gain {gain}, image noise: {noise}. Depth: {depth}.
 /// What differs from an ideal camera and an undisturbed walk, a line for each.
 fn sensor_notes(sequence: &SynthSequence) -> String {
     let config = sequence.config();
-    let SensorModel { readout_seconds, depth_delay_seconds, auto_exposure, vignetting, imu, is_on_record } =
-        config.sensor;
+    let SensorModel {
+        readout_seconds,
+        depth_delay_seconds,
+        depth_readout_seconds,
+        auto_exposure,
+        vignetting,
+        imu,
+        is_on_record,
+    } = config.sensor;
     let events = &config.events;
     let mut notes = Vec::new();
     if readout_seconds != 0.0 {
@@ -137,8 +148,14 @@ fn sensor_notes(sequence: &SynthSequence) -> String {
     }
     if depth_delay_seconds != 0.0 {
         notes.push(format!(
-            "Depth is measured {depth_delay_seconds} s after the colour timestamp, all rows together; depth.txt and \
-             associations.txt have its own timestamps."
+            "Depth is measured {depth_delay_seconds} s after the colour timestamp; depth.txt and associations.txt have \
+             its own timestamps."
+        ));
+    }
+    if depth_readout_seconds != 0.0 {
+        notes.push(format!(
+            "Row v of depth is measured ((v + 1/2)/{} - 1/2) * {depth_readout_seconds} s after its timestamp.",
+            config.height
         ));
     }
     if auto_exposure {

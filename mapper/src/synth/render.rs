@@ -137,6 +137,28 @@ pub(super) struct DepthSample {
     pub(super) incidence: f32,
 }
 
+/// Depth and incidence through the pixel centres when each row is measured at its own time, from `view_at(row)`.
+pub(super) fn rolling_depth(
+    scene: &Scene,
+    size: Size,
+    view_at: impl Fn(usize) -> View + Sync,
+) -> Vec<DepthSample> {
+    let mut samples = vec![DepthSample::default(); size.width * size.height];
+    samples.par_chunks_mut(size.width).enumerate().for_each(|(row, samples)| {
+        let view = view_at(row);
+        let mut visible = Vec::new();
+        for left in (0..size.width).step_by(STRETCH) {
+            let right = size.width.min(left + STRETCH);
+            cull_block(scene, &view, &Block { left, top: row, width: STRETCH, height: 1 }, &mut visible);
+            for (column, sample) in (left..right).zip(&mut samples[left..right]) {
+                let ray = view.ray(column as f32, row as f32);
+                *sample = depth_sample(scene, &ray, &scene.hit(&ray, &visible));
+            }
+        }
+    });
+    samples
+}
+
 /// Depth and incidence through the pixel centres, row by row.
 pub(super) fn depth(scene: &Scene, size: Size, view: &View) -> Vec<DepthSample> {
     let mut samples = vec![DepthSample::default(); size.width * size.height];

@@ -89,6 +89,26 @@ fn depth_is_measured_at_its_own_time() {
     assert_eq!((captured.timestamp, captured.depth_timestamp), (prompt.timestamp(2), prompt.timestamp(3)));
 }
 
+#[test]
+fn rows_of_depth_are_measured_one_after_the_other() {
+    // A readout of a quarter of the interval either way: a row is that of a sequence with depth of this row's delay.
+    let readout = -0.25 / 30.0;
+    let rolling = sequence(with_sensor(SensorModel { depth_readout_seconds: readout, ..SensorModel::IDEAL }));
+    let frame = rolling.render_frame(2);
+    let (width, height) = (frame.width, frame.height);
+    for row in [0, height / 2, height - 1] {
+        let delay = ((row as f64 + 0.5) / height as f64 - 0.5) * readout;
+        let prompt = sequence(with_sensor(SensorModel { depth_delay_seconds: delay, ..SensorModel::IDEAL }));
+        let of_row = |depth: &[u16]| depth[row * width..(row + 1) * width].to_vec();
+        let (found, expected) = (of_row(&frame.depth), of_row(&prompt.render_frame(2).depth));
+        // Timestamps are whole microseconds, so a few of the least units may differ.
+        let differs = |(a, b): (&u16, &u16)| a.abs_diff(*b) > 2;
+        let wrong = found.iter().zip(&expected).filter(|pair| differs(*pair)).count();
+        assert!(wrong <= width / 50, "row {row}: {wrong} of {width}");
+    }
+    assert_eq!(frame.depth_timestamp, frame.timestamp);
+}
+
 /// Mean linear light of an image.
 fn mean_light(rgb: &[u8]) -> f64 {
     let linear = InverseResponse::srgb();
@@ -246,6 +266,7 @@ fn what_is_not_on_record_is_in_the_truth() {
     let sensor = SensorModel {
         readout_seconds: 0.02,
         depth_delay_seconds: 0.011,
+        depth_readout_seconds: 0.01,
         auto_exposure: true,
         vignetting: Vignetting { a2: -0.35, a4: 0.05 },
         imu: false,
@@ -262,6 +283,7 @@ fn what_is_not_on_record_is_in_the_truth() {
     assert_eq!(calibration.readout, Readout::Rolling { seconds: Some(0.02) });
     assert_eq!(calibration.response, Response::Table(Box::new(measured.clone())));
     assert_eq!(calibration.vignetting, sensor.vignetting);
+    assert_eq!(calibration.depth_readout_seconds, 0.01);
     assert_eq!(calibration.exposure, ExposureSource::PerFrame);
     for index in 0..3 {
         assert_eq!(known.exposure_seconds(index), sequence.exposure_seconds(index));

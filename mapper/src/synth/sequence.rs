@@ -256,8 +256,13 @@ impl SynthSequence {
     }
 
     fn render_depth(&self, index: usize) -> Vec<u16> {
-        let view = self.view(index, self.depth_timestamp(index));
-        let samples = render::depth(&self.scene, self.size(), &view);
+        let mid = self.depth_timestamp(index);
+        let samples = if self.config.sensor.depth_readout_seconds == 0.0 {
+            render::depth(&self.scene, self.size(), &self.view(index, mid))
+        } else {
+            let view_of_row = |row: usize| self.view(index, mid + timing::depth_row_delay(&self.config, row));
+            render::rolling_depth(&self.scene, self.size(), view_of_row)
+        };
         self.config.depth.measure(&samples, self.camera.width, self.config.seed, index)
     }
 

@@ -20,7 +20,17 @@ pub(super) fn depth_timestamp(config: &SynthConfig, index: usize) -> f64 {
 
 /// How much later than the middle of the image a row is exposed, seconds.
 pub(super) fn row_delay(config: &SynthConfig, row: usize) -> f64 {
-    ((row as f64 + 0.5) / config.height as f64 - 0.5) * config.sensor.readout_seconds
+    row_share(config, row) * config.sensor.readout_seconds
+}
+
+/// How much later than the middle of the depth map a row of it is measured, seconds.
+pub(super) fn depth_row_delay(config: &SynthConfig, row: usize) -> f64 {
+    row_share(config, row) * config.sensor.depth_readout_seconds
+}
+
+/// Place of the middle of a row within the image's height, from -1/2 to 1/2.
+fn row_share(config: &SynthConfig, row: usize) -> f64 {
+    (row as f64 + 0.5) / config.height as f64 - 0.5
 }
 
 /// Poses at opening, middle and closing of the shutter that is open for `exposure` seconds around `delay` after the

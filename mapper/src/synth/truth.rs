@@ -15,9 +15,9 @@ pub(super) fn write(sequence: &SynthSequence, folder: &Path) -> Result<(), Synth
     let folder = folder.join(FOLDER);
     let Vignetting { a2, a4 } = config.sensor.vignetting;
     let readme = format!(
-        "readout {:?} s; vignetting 1 + {a2:?} r^2 + {a4:?} r^4 (r = 1 in the corner); exposures.csv; response.csv: \
+        "readout {:?} s, of depth {:?} s; vignetting 1 + {a2:?} r^2 + {a4:?} r^4 (r = 1 in the corner); exposures.csv; response.csv: \
          what is stored (0 to 1) for linear light (0 to 1); calibration.toml: all of it as it would be on record\n",
-        config.sensor.readout_seconds
+        config.sensor.readout_seconds, config.sensor.depth_readout_seconds
     );
     let mut texts = vec![
         ("README.md", readme),

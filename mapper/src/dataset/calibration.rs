@@ -30,6 +30,9 @@ pub struct Calibration {
     /// When depth is measured: its time minus that of the colour image, seconds. Without it, depth images keep
     /// the timestamps they have.
     pub depth_delay_seconds: Option<f64>,
+    /// What is added to the timestamps of depth images to get the time of their middle row, seconds; 0 where
+    /// [`Self::depth_delay_seconds`] stands in for the timestamps.
+    pub depth_clock_seconds: f64,
     /// How light falls off towards the corners of the stored colour images.
     pub vignetting: Vignetting,
     /// Takes vectors in the camera's axes to those of the IMU. Without it the usual axes of the IMU's file hold
@@ -178,6 +181,7 @@ impl Calibration {
             readout: Readout::Global,
             depth_readout_seconds: 0.0,
             depth_delay_seconds: None,
+            depth_clock_seconds: 0.0,
             vignetting: Vignetting::NONE,
             imu_from_camera: None,
             sources: CalibrationSources::GEOMETRY_ONLY,
@@ -215,6 +219,8 @@ impl Calibration {
             }
             CameraFact::DepthDelay => {
                 self.depth_delay_seconds = other.depth_delay_seconds;
+                self.depth_clock_seconds = other.depth_clock_seconds;
+                self.depth_readout_seconds = other.depth_readout_seconds;
                 self.sources.depth_delay = sources.depth_delay;
             }
         }
@@ -293,6 +299,18 @@ impl Calibration {
             if !(-MAX_READOUT..=MAX_READOUT).contains(&seconds) {
                 return Err(invalid(key, seconds, "seconds from the first row to the last, -0.1 to 0.1"));
             }
+        }
+        let clock = self.depth_clock_seconds;
+        if !(-MAX_DEPTH_DELAY..=MAX_DEPTH_DELAY).contains(&clock) {
+            return Err(invalid(
+                "depth_clock_seconds",
+                clock,
+                "seconds to add to depth's timestamps, -0.2 to 0.2",
+            ));
+        }
+        if clock != 0.0 && self.depth_delay_seconds.is_some() {
+            let expected = "0 or nothing beside depth_delay_seconds, which replaces the timestamps";
+            return Err(invalid("depth_clock_seconds", clock, expected));
         }
         match self.depth_delay_seconds {
             Some(seconds) if !(-MAX_DEPTH_DELAY..=MAX_DEPTH_DELAY).contains(&seconds) => {

@@ -36,6 +36,7 @@ struct Keys {
     readout_seconds: Option<f64>,
     depth_readout_seconds: Option<f64>,
     depth_delay_seconds: Option<f64>,
+    depth_clock_seconds: Option<f64>,
     vignetting: Option<[f64; 2]>,
     imu_from_camera: Option<RotationKey>,
     estimated: Option<Vec<CameraFact>>,
@@ -119,6 +120,7 @@ fn calibration(
     calibration.response = response(path, text, keys.response, warnings)?;
     calibration.depth_readout_seconds = keys.depth_readout_seconds.unwrap_or(0.0);
     calibration.depth_delay_seconds = keys.depth_delay_seconds;
+    calibration.depth_clock_seconds = keys.depth_clock_seconds.unwrap_or(0.0);
     calibration.vignetting = keys.vignetting.map_or(Vignetting::NONE, |[a2, a4]| Vignetting { a2, a4 });
     calibration.imu_from_camera = keys.imu_from_camera.map(rotation).transpose().map_err(located)?;
     Ok(calibration)
@@ -146,8 +148,14 @@ fn sources(keys: &Keys) -> Result<CalibrationSources, InvalidValue> {
         readout: of(CameraFact::Readout, keys.readout.is_some() || keys.readout_seconds.is_some())?,
         response: of(CameraFact::Response, keys.response.is_some())?,
         vignetting: of(CameraFact::Vignetting, keys.vignetting.is_some())?,
-        depth_delay: of(CameraFact::DepthDelay, keys.depth_delay_seconds.is_some())?,
+        depth_delay: of(CameraFact::DepthDelay, is_depth_timed(keys))?,
     })
+}
+
+/// Whether anything but timestamps tells when depth is measured.
+fn is_depth_timed(keys: &Keys) -> bool {
+    let Keys { depth_delay_seconds, depth_clock_seconds, depth_readout_seconds, .. } = keys;
+    [depth_delay_seconds, depth_clock_seconds, depth_readout_seconds].into_iter().any(Option::is_some)
 }
 
 /// The readout of two keys that must not contradict each other; a time alone says that rows are exposed one after

@@ -98,6 +98,8 @@ impl Lines {
         }
         if let Some(seconds) = calibration.depth_delay_seconds {
             self.add("depth_delay_seconds", seconds);
+        } else if calibration.depth_clock_seconds != 0.0 {
+            self.add("depth_clock_seconds", calibration.depth_clock_seconds);
         }
     }
 
@@ -161,6 +163,7 @@ mod tests {
         assert_eq!(written_and_read(&calibration), calibration);
         calibration.readout = Readout::Global;
         calibration.response = Response::Linear;
+        (calibration.depth_delay_seconds, calibration.depth_clock_seconds) = (None, -0.0207);
         calibration.sources.readout = Knowledge::Recorded;
         assert_eq!(written_and_read(&calibration), calibration);
     }

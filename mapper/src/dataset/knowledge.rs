@@ -43,7 +43,7 @@ pub enum CameraFact {
     Response,
     /// Fall-off of light towards the corners.
     Vignetting,
-    /// Time from a colour image to its depth image. Assumed where only the timestamps tell.
+    /// Time from a colour image to its depth image, and of the rows of depth. Assumed where only the timestamps tell.
     DepthDelay,
 }
 

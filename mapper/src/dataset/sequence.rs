@@ -290,7 +290,8 @@ impl Dataset {
 
     fn entry_depth_timestamp(&self, entry: &FrameEntry) -> f64 {
         let delayed = |delay| entry.timestamp + delay;
-        self.calibration.depth_delay_seconds.map_or(entry.depth_timestamp, delayed)
+        let by_its_clock = entry.depth_timestamp + self.calibration.depth_clock_seconds;
+        self.calibration.depth_delay_seconds.map_or(by_its_clock, delayed)
     }
 
     /// Finds again what is odd, and reads the IMU, whose axes the calibration decides.

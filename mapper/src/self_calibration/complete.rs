@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use mba_tracker::geometry::PinholeCamera;
+
+use super::depth_time::{self, Measured};
 use super::exposure::{self, PixelScale};
 use super::finding::{Finding, Value};
 use super::robust::median;
@@ -26,6 +29,19 @@ const BRIGHTNESS_DOUBT: f64 = 1.25;
 
 /// Relative error of an exposure time that many frames share: of paths, and of the polynomial between poses.
 const SYSTEMATIC: f64 = 0.02;
+
+/// Rows that follow each other take longer than this, seconds; with less, depth rolls nearly as colour does.
+const SHORTEST_READOUT: f64 = 6e-3;
+
+/// Relative error of a readout from edges: of the polynomial between poses, and of depth's own edges.
+const READOUT_SYSTEMATIC: f64 = 0.05;
+
+/// Rounds of looking at edges.
+const EDGE_ROUNDS: usize = 2;
+
+/// Depth that lies further beside colour is worth telling: shares of the image's width, and how well that is known.
+const TELLING_SHIFT: f64 = 0.005;
+const SHIFT_SIGMA: f64 = 0.0015;
 
 const MILLISECONDS: (f64, &str) = (1e3, "ms");
 
@@ -65,7 +81,13 @@ pub fn complete(dataset: Dataset) -> Result<(Dataset, Vec<Finding>), DatasetErro
 struct Estimates {
     /// Seconds for each frame, and the relative standard deviation that they share; none without motion.
     exposures: Option<(Vec<f64>, f64)>,
-    readout: Option<search::Readout>,
+    readout: Option<Measured>,
+    /// Seconds by which depth is later than its timestamps.
+    depth_delay: Option<Measured>,
+    /// Whether the rows of depth take as long as those of colour.
+    depth_rolls: bool,
+    /// Pixels that depth lies beside colour; none where the picture does not tell.
+    depth_shift: Option<[f64; 2]>,
     /// Whether the frames say anything about the readout.
     readout_was_sought: bool,
 }
@@ -74,44 +96,82 @@ impl Estimates {
     fn of(dataset: &Dataset) -> Self {
         let calibration = dataset.calibration();
         let (exposure_known, readout_known) = (is_exposure_known(calibration), is_readout_known(calibration));
-        let options = TrackingOptions::default();
-        let nothing = Self { exposures: None, readout: None, readout_was_sought: !readout_known };
+        let mut found = Self {
+            exposures: None,
+            readout: None,
+            depth_delay: None,
+            depth_rolls: false,
+            depth_shift: None,
+            readout_was_sought: !readout_known,
+        };
         let Some(depth) = survey(dataset, DEPTH_SAMPLES).median_depth.filter(|_| dataset.len() >= MIN_FRAMES)
         else {
-            return nothing;
+            return found;
         };
-        let scale = PixelScale::new(&calibration.camera, depth);
-        let mut guess = Guess {
-            exposures: (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect(),
-            readout: calibration.readout.readout_seconds().unwrap_or(0.0),
-            focal_scale: 1.0,
-        };
+        let options = TrackingOptions::default();
+        let guess = Guess::of(dataset);
         let first = everything(dataset, &options, &guess);
         let range = liveliest(&first, dataset.len());
-        let whole = range.len() == dataset.len();
-        let window = Window::read(dataset, range);
+        let window = Window::read(dataset, range.clone());
+        let scale = PixelScale::new(&calibration.camera, depth);
         let search = Search { dataset, options: &options, window: &window, scale };
-        let mut readout = None;
-        if !readout_known && let Some(coarse) = search.coarse_readout(&guess, exposure_known) {
-            guess = coarse.guess.clone();
-            if !exposure_known && whole {
-                guess.exposures = follow_brightness(&coarse.tracked, &guess);
-            }
-            if let Some(start) = search.probe(vec![guess.clone()]).pop() {
-                readout = search.refine_readout(start, exposure_known);
-            }
-            guess.readout = readout.filter(search::Readout::is_certain).map_or(0.0, |found| found.seconds);
+        let mut guess = found.look_at_edges(&search, guess, within(&first, &range));
+        let whole = range.len() == dataset.len();
+        if !readout_known && found.readout.is_none() {
+            found.readout = find_readout(&search, &mut guess, exposure_known, whole);
+            found.depth_rolls &= found.readout.is_some();
         }
-        let exposures = if exposure_known { None } else { find_exposures(&search, guess, whole) };
-        Self { exposures, readout, ..nothing }
+        found.exposures = if exposure_known { None } else { find_exposures(&search, guess, whole) };
+        found
+    }
+
+    /// What the edges of colour and depth tell, in two rounds: the second knows the motion better. Returns the guess with it.
+    fn look_at_edges(&mut self, search: &Search<'_>, mut guess: Guess, tracked: &[Tracked]) -> Guess {
+        let calibration = search.dataset.calibration();
+        let is_delay_known = calibration.sources.depth_delay != Knowledge::Assumed;
+        let mut tracked = tracked.to_vec();
+        for _ in 0..EDGE_ROUNDS {
+            let Some(edges) = depth_time::find(search.window, search.dataset, &tracked) else { break };
+            self.depth_shift = Some(edges.shift);
+            let before = guess.clone();
+            if !is_delay_known && edges.delay.differs_from_none() {
+                self.depth_delay = Some(edges.delay);
+                guess.depth_delay = edges.delay.seconds;
+            }
+            if self.readout_was_sought && edges.rows.is_certain() {
+                if edges.rows.differs_from_none() && edges.rows.seconds.abs() > SHORTEST_READOUT {
+                    // The motion that the edges are moved by is as uncertain as that of exposures.
+                    let systematic = READOUT_SYSTEMATIC * edges.rows.seconds;
+                    let sigma = edges.rows.sigma.hypot(systematic);
+                    self.readout = Some(Measured { sigma, ..edges.rows });
+                    guess.readout = edges.rows.seconds;
+                } else {
+                    self.depth_rolls = matches!(calibration.readout, Readout::Rolling { .. });
+                }
+            }
+            guess.depth_rolls = self.depth_rolls;
+            let Some(probe) = search.probe(vec![guess.clone()]).pop().filter(|_| guess != before) else {
+                break;
+            };
+            tracked = probe.tracked;
+        }
+        guess
     }
 
     fn apply(&self, dataset: Dataset) -> Result<Dataset, DatasetError> {
         let mut calibration = dataset.calibration().clone();
         let exposure_known = is_exposure_known(&calibration);
-        if let Some(found) = self.readout.filter(search::Readout::is_certain) {
+        if let Some(found) = self.readout {
             calibration.readout = Readout::Rolling { seconds: Some(found.seconds) };
             calibration.sources.readout = Knowledge::Estimated;
+            if self.depth_rolls {
+                calibration.depth_readout_seconds = found.seconds;
+                calibration.sources.depth_delay = Knowledge::Estimated;
+            }
+        }
+        if let Some(found) = self.depth_delay {
+            calibration.depth_clock_seconds = found.seconds;
+            calibration.sources.depth_delay = Knowledge::Estimated;
         }
         if !exposure_known && self.exposures.is_none() {
             calibration.exposure = ExposureSource::Assumed { seconds: SHORTEST };
@@ -131,6 +191,8 @@ impl Estimates {
         if self.readout_was_sought {
             findings.push(self.readout_finding(dataset.calibration()));
         }
+        findings.extend(self.delay_finding());
+        findings.extend(self.shift_finding(&dataset.calibration().camera));
         findings
     }
 
@@ -155,31 +217,82 @@ impl Estimates {
     }
 
     fn readout_finding(&self, calibration: &Calibration) -> Finding {
-        let known = |found: &search::Readout| Finding {
+        let Some(found) = self.readout else {
+            let note = match calibration.readout {
+                Readout::Global => "rows explain no more than a global shutter",
+                Readout::Rolling { .. } => "too little to tell; all rows are taken for exposed together",
+            };
+            return Finding {
+                fact: "readout",
+                knowledge: Knowledge::Assumed,
+                value: None,
+                note: note.into(),
+            };
+        };
+        let note = if self.depth_rolls { "of colour and of depth" } else { "" };
+        Finding {
             fact: "readout",
             knowledge: Knowledge::Estimated,
             value: Some(Value { value: found.seconds, sigma: found.sigma, printed: MILLISECONDS }),
-            note: String::new(),
-        };
-        let unknown = || Finding {
-            fact: "readout",
-            knowledge: Knowledge::Assumed,
-            value: None,
-            note: match calibration.readout {
-                Readout::Global => "rows explain no more than a global shutter".into(),
-                Readout::Rolling { .. } => {
-                    "too little to tell; all rows are taken for exposed together".into()
-                }
-            },
-        };
-        self.readout.as_ref().filter(|found| found.is_certain()).map_or_else(unknown, known)
+            note: note.into(),
+        }
     }
+
+    fn delay_finding(&self) -> Option<Finding> {
+        let found = self.depth_delay?;
+        Some(Finding {
+            fact: "depth_delay",
+            knowledge: Knowledge::Estimated,
+            value: Some(Value { value: found.seconds, sigma: found.sigma, printed: MILLISECONDS }),
+            note: "added to the timestamps of depth".into(),
+        })
+    }
+
+    /// Depth that lies beside its colour, which is told but not mended: parallax differs from pixel to pixel.
+    fn shift_finding(&self, camera: &PinholeCamera) -> Option<Finding> {
+        let [x, y] = self.depth_shift?;
+        let length = x.hypot(y);
+        (length > TELLING_SHIFT * camera.width as f64).then(|| Finding {
+            fact: "depth_shift",
+            knowledge: Knowledge::Estimated,
+            value: Some(Value { value: length, sigma: SHIFT_SIGMA * camera.width as f64, printed: (1.0, "px") }),
+            note: format!(
+                "({x:+.1}, {y:+.1}); depth is not registered to colour there; not mended, see the camera's own calibration"
+            ),
+        })
+    }
+}
+
+/// Those of the tracked frames that lie in `range` of the data set.
+fn within<'a>(tracked: &'a [Tracked], range: &Range<usize>) -> &'a [Tracked] {
+    let first = tracked.partition_point(|frame| frame.index < range.start);
+    let end = tracked.partition_point(|frame| frame.index < range.end);
+    &tracked[first..end]
+}
+
+/// The readout with which the window is tracked best; the guess comes to have it.
+fn find_readout(
+    search: &Search<'_>,
+    guess: &mut Guess,
+    exposure_known: bool,
+    whole: bool,
+) -> Option<Measured> {
+    let coarse = search.coarse_readout(guess, exposure_known)?;
+    *guess = coarse.guess.clone();
+    if !exposure_known && whole {
+        guess.exposures = follow_brightness(&coarse.tracked, guess);
+    }
+    let start = search.probe(vec![guess.clone()]).pop();
+    let readout = start.and_then(|start| search.refine_readout(start, exposure_known));
+    let certain = readout.filter(search::Readout::is_certain);
+    guess.readout = certain.map_or(0.0, |found| found.seconds);
+    certain.map(|found| Measured { seconds: found.seconds, sigma: found.sigma })
 }
 
 /// Tracks every frame of the data set.
 fn everything(dataset: &Dataset, options: &TrackingOptions, guess: &Guess) -> Vec<Tracked> {
     let frames = (0..dataset.len()).filter_map(|index| dataset.frame(index).ok());
-    window::track(frames, &window::config(dataset, options, guess), &guess.exposures)
+    window::track(frames, &window::config(dataset, options, guess), guess)
 }
 
 /// The stretch of at most [`WINDOW`] frames that turns most.

@@ -3,11 +3,9 @@
 use mba_tracker::geometry::PinholeCamera;
 use nalgebra::Vector6;
 
+use super::motion::motion;
 use super::robust::{Spread, median, spread};
 use super::window::Tracked;
-
-/// Longest gap between neighbours whose poses tell a velocity, seconds: three frames of a video.
-const MAX_GAP: f64 = 0.11;
 
 /// Least motion from frame to frame, pixels, for a frame to say anything: its blur is then about as long as the
 /// uncertainty of a path.
@@ -45,42 +43,11 @@ impl PixelScale {
     }
 }
 
-/// Velocity at frame `index` of `tracked`, per second in its own axes: the derivative of the polynomial through the
-/// poses at mid exposure of two frames on either side, of one where there are no two.
-///
-/// Three points would be too few: with a hand that shakes at 4 Hz, a difference over two intervals of 1/30 s is
-/// 11 % too short, the polynomial of five points 2 %.
-pub(super) fn velocity(tracked: &[Tracked], index: usize) -> Option<Vector6<f64>> {
-    let centre = &tracked[index];
-    let near = |other: &Tracked, frames: f64| {
-        other.is_found && (other.timestamp - centre.timestamp).abs() <= frames * MAX_GAP
-    };
-    let side = |reach: usize| {
-        let (first, last) = (index.checked_sub(reach)?, index + reach);
-        let stretch = tracked.get(first..=last)?;
-        stretch.iter().all(|other| near(other, reach as f64)).then_some(stretch)
-    };
-    let stretch = side(2).or_else(|| side(1))?;
-    let times: Vec<f64> = stretch.iter().map(|other| other.timestamp - centre.timestamp).collect();
-    // Derivative at time 0 of the Lagrange polynomial of each point; that of the middle point has value 0 there.
-    let weight = |j: usize| {
-        let others = || (0..times.len()).filter(|&k| k != j);
-        let denominator: f64 = others().map(|k| times[j] - times[k]).product();
-        let numerator: f64 = others().filter(|&k| times[k] != 0.0).map(|k| -times[k]).product();
-        numerator / denominator
-    };
-    let mut sum = Vector6::zeros();
-    for (j, other) in stretch.iter().enumerate().filter(|(j, _)| times[*j] != 0.0) {
-        sum += centre.world_from_mid.tangent_to(&other.world_from_mid) * weight(j);
-    }
-    Some(sum)
-}
-
 /// Exposure times that single frames tell, seconds, with the pixels that the picture moves between two frames.
 pub(super) fn observations(tracked: &[Tracked], scale: &PixelScale, interval: f64) -> Vec<(usize, f64, f64)> {
     let observe = |k: usize| {
         let frame = &tracked[k];
-        let rate = scale.pixels(&velocity(tracked, k).filter(|_| frame.is_found)?);
+        let rate = scale.pixels(&motion(tracked, k).filter(|_| frame.is_found)?.velocity);
         let motion = interval * rate.norm();
         let within = scale.pixels(&frame.world_from_camera.motion());
         (motion >= MIN_MOTION_PX).then(|| (frame.index, within.dot(&rate) / rate.norm_squared(), motion))

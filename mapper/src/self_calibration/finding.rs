@@ -21,7 +21,7 @@ pub struct Value {
 /// What came of looking for one fact about the camera.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was looked for: `exposure`, `readout` or `focal_length`.
+    /// What was looked for: `exposure`, `readout`, `depth_delay`, `depth_shift` or `focal_length`.
     pub fact: &'static str,
     /// Estimated, or still assumed.
     pub knowledge: Knowledge,

@@ -28,11 +28,7 @@ pub fn focal_length(dataset: &Dataset) -> (Finding, Option<f64>) {
     let options = TrackingOptions::default();
     let window = Window::read(dataset, 0..FRAMES.min(dataset.len()));
     let probe = |focal_scale: f64| {
-        let guess = Guess {
-            exposures: (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect(),
-            readout: dataset.calibration().readout.readout_seconds().unwrap_or(0.0),
-            focal_scale,
-        };
+        let guess = Guess { focal_scale, ..Guess::of(dataset) };
         misfits(&window.track(dataset, &options, &guess))
     };
     let height = |misfits: &[f64]| trimmed_mean(misfits).map_or(f64::INFINITY, |mean| mean.median);

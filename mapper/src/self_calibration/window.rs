@@ -16,8 +16,30 @@ pub(super) struct Guess {
     pub(super) exposures: Vec<f64>,
     /// Time from the first row of colour to the last, seconds.
     pub(super) readout: f64,
+    /// Added to the timestamps of depth, seconds.
+    pub(super) depth_delay: f64,
+    /// Whether the rows of depth take as long as those of colour; otherwise they are measured together.
+    pub(super) depth_rolls: bool,
     /// Factor on the focal lengths on record.
     pub(super) focal_scale: f64,
+}
+
+impl Guess {
+    /// What is on record, or usual where nothing is.
+    pub(super) fn of(dataset: &Dataset) -> Self {
+        Self {
+            exposures: (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect(),
+            readout: dataset.calibration().readout.readout_seconds().unwrap_or(0.0),
+            depth_delay: 0.0,
+            depth_rolls: false,
+            focal_scale: 1.0,
+        }
+    }
+
+    /// Time from the first row of depth to the last, seconds.
+    pub(super) fn depth_readout(&self, dataset: &Dataset) -> f64 {
+        if self.depth_rolls { self.readout } else { dataset.calibration().depth_readout_seconds }
+    }
 }
 
 /// What tracking found out about one frame.
@@ -45,6 +67,8 @@ pub(super) struct Tracked {
 pub(super) fn config(dataset: &Dataset, options: &TrackingOptions, guess: &Guess) -> TrackerConfig {
     let mut config = tracker_config(dataset, options);
     config.readout.colour = guess.readout;
+    config.readout.depth = guess.depth_readout(dataset);
+    config.readout.depth_apart |= guess.depth_delay != 0.0;
     config.camera.fx *= guess.focal_scale;
     config.camera.fy *= guess.focal_scale;
     config
@@ -54,7 +78,7 @@ pub(super) fn config(dataset: &Dataset, options: &TrackingOptions, guess: &Guess
 pub(super) fn track<T: std::borrow::Borrow<RgbdFrame>>(
     frames: impl Iterator<Item = T>,
     config: &TrackerConfig,
-    exposures: &[f64],
+    guess: &Guess,
 ) -> Vec<Tracked> {
     let mut memory = vec![0; config.workspace_len()];
     let Ok(mut tracker) = Tracker::new(config, SimdLevel::new(), &mut memory) else { return Vec::new() };
@@ -62,7 +86,8 @@ pub(super) fn track<T: std::borrow::Borrow<RgbdFrame>>(
     for image in frames {
         let image = image.borrow();
         let Ok(mut view) = tracker_view(image) else { continue };
-        view.exposure = exposures.get(image.index).copied().unwrap_or(image.exposure_seconds);
+        view.exposure = guess.exposures.get(image.index).copied().unwrap_or(image.exposure_seconds);
+        view.depth_timestamp += guess.depth_delay;
         let Ok(result) = tracker.track(&view) else { continue };
         if let Some(revision) = &result.revision
             && let Some(revised) = found.get_mut(revision.index)
@@ -103,8 +128,14 @@ impl Window {
         Self { frames: range.filter_map(|index| dataset.frame(index).ok()).collect() }
     }
 
+    /// The frame with this index of the data set; none if it is not in the window or was unreadable.
+    pub(super) fn frame(&self, index: usize) -> Option<&RgbdFrame> {
+        let place = self.frames.binary_search_by_key(&index, |frame| frame.index).ok()?;
+        self.frames.get(place)
+    }
+
     /// Tracks the window with a supposed camera.
     pub(super) fn track(&self, dataset: &Dataset, options: &TrackingOptions, guess: &Guess) -> Vec<Tracked> {
-        track(self.frames.iter(), &config(dataset, options, guess), &guess.exposures)
+        track(self.frames.iter(), &config(dataset, options, guess), guess)
     }
 }

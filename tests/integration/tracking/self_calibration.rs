@@ -56,6 +56,40 @@ fn exposure_and_readout_of_a_rolling_camera_are_found_and_kept() {
 }
 
 #[test]
+fn when_depth_was_measured_is_found_from_edges() {
+    // A camera whose depth comes 18 ms early and claims to be of the time of colour: with rows of colour one after the
+    // other, and with those of depth as well.
+    for depth_readout_seconds in [0.0, 0.02] {
+        let sensor = SensorModel {
+            readout_seconds: 0.02,
+            depth_delay_seconds: -0.018,
+            depth_readout_seconds,
+            ..SensorModel::IDEAL
+        };
+        let (folder, _, _) = unknown(sensor, 4.0);
+        let list = folder.path().join("associations.txt");
+        let text = std::fs::read_to_string(&list).unwrap();
+        let claimed = |line: &str| {
+            let words: Vec<&str> = line.split_whitespace().collect();
+            format!("{0} {1} {0} {2}\n", words[0], words[1], words[3])
+        };
+        let lines = text.lines().filter(|line| !line.starts_with('#'));
+        std::fs::write(&list, lines.map(claimed).collect::<String>()).unwrap();
+        let dataset = dataset::open(folder.path()).unwrap();
+        assert_eq!(dataset.depth_timestamp(3), dataset.timestamp(3));
+
+        let (completed, findings) = complete(dataset).unwrap();
+        let delay = completed.depth_timestamp(3) - completed.timestamp(3);
+        assert!((delay + 0.018).abs() < 0.002, "delay {delay}, {findings:?}");
+        assert_eq!(completed.calibration().sources.depth_delay, Knowledge::Estimated);
+        if depth_readout_seconds == 0.0 {
+            let found = readout(&completed);
+            assert!((found / 0.02 - 1.0).abs() < 0.1, "readout {found}, {findings:?}");
+        }
+    }
+}
+
+#[test]
 fn a_still_camera_tells_nothing_and_is_taken_for_sharp() {
     let (_folder, _, dataset) = unknown(SensorModel::IDEAL, 0.0);
     let (completed, findings) = complete(dataset).unwrap();

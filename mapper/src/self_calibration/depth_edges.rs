@@ -1,0 +1,200 @@
+//! Jumps of depth beside the edges of the picture: where a near thing ends in front of a far one, both have an edge.
+//!
+//! Depth is measured at another time than colour, and rows of either may follow each other. Then an edge of depth lies
+//! beside that of colour by the motion in between, which shows when that was.
+
+use mba_tracker::geometry::PinholeCamera;
+use nalgebra::{Vector3, Vector6};
+
+use super::motion::motion;
+use super::window::Tracked;
+use crate::dataset::RgbdFrame;
+
+/// Pixels between the two depths of a jump: a sensor leaves out the pixels on the edge itself.
+const REACH: usize = 4;
+
+/// Least relative difference of the two depths; a surface that is seen from the side has less over so few pixels.
+const MIN_JUMP: f64 = 0.08;
+
+/// Gradients above this, in steps of 8 bits, count no more than this: one strong edge is not worth many.
+const STRONGEST: f32 = 60.0;
+
+/// A jump of depth.
+#[derive(Clone, Copy, Debug)]
+struct EdgePoint {
+    /// Pixel of the depth map, in the middle of the jump.
+    place: [f64; 2],
+    /// How the near side moves in the picture: pixels per second, and per square of a second.
+    velocity: [f64; 2],
+    acceleration: [f64; 2],
+}
+
+/// Jumps of depth in a frame and the strength of its picture's edges.
+#[derive(Debug)]
+pub(super) struct EdgeFrame {
+    width: usize,
+    height: usize,
+    /// Smoothed magnitude of the brightness gradient of every pixel.
+    gradient: Vec<f32>,
+    points: Vec<EdgePoint>,
+    /// Timestamp of depth minus that of colour, seconds.
+    stamp: f64,
+}
+
+/// How depth is supposed to lie beside colour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Supposition {
+    /// Where depth lies in the picture when nothing moves: columns, rows (pixels), and relative size about the middle.
+    pub(super) shift: [f64; 2],
+    pub(super) zoom: f64,
+    /// Seconds by which depth is measured later than its timestamp.
+    pub(super) delay: f64,
+    /// Time from the first row to the last, of colour minus that of depth, seconds.
+    pub(super) rows: f64,
+}
+
+impl Supposition {
+    /// Everything as the timestamps say.
+    pub(super) const NONE: Self = Self { shift: [0.0; 2], zoom: 0.0, delay: 0.0, rows: 0.0 };
+}
+
+impl EdgeFrame {
+    /// Jumps of frame `image`, which is `tracked[index]`, with raw depth units of `depth_scale` per metre; none without a
+    /// velocity.
+    pub(super) fn new(
+        image: &RgbdFrame,
+        camera: &PinholeCamera,
+        depth_scale: f64,
+        tracked: &[Tracked],
+        index: usize,
+    ) -> Option<Self> {
+        let motion = motion(tracked, index)?;
+        let camera_from_world = tracked[index].world_from_mid.rotation.inverse();
+        let flow = |motion: &Vector6<f64>, ray: &Vector3<f64>, inverse_depth: f64| {
+            let shift = camera_from_world * Vector3::from(motion.fixed_rows::<3>(0));
+            // What stands still moves against the camera; per depth, so that the z of the ray is 1.
+            let moved = -Vector3::from(motion.fixed_rows::<3>(3)).cross(ray) - shift * inverse_depth;
+            [camera.fx * (moved.x - ray.x * moved.z), camera.fy * (moved.y - ray.y * moved.z)]
+        };
+        let point = |(place, raw): ([f64; 2], u16)| {
+            let (ray, inverse_depth) = (camera.ray(place[0], place[1]), depth_scale / f64::from(raw));
+            EdgePoint {
+                place,
+                velocity: flow(&motion.velocity, &ray, inverse_depth),
+                acceleration: flow(&motion.acceleration, &ray, inverse_depth),
+            }
+        };
+        Some(Self {
+            width: image.width,
+            height: image.height,
+            gradient: gradient(image),
+            points: jumps(image).into_iter().map(point).collect(),
+            stamp: image.depth_timestamp - image.timestamp,
+        })
+    }
+
+    /// Number of jumps.
+    pub(super) fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Keeps every `step`-th jump.
+    pub(super) fn thin_out(&mut self, step: usize) {
+        self.points = self.points.iter().step_by(step).copied().collect();
+    }
+
+    /// Sum of the strengths of the picture's edges where the jumps of depth should lie, and of how many that is. Those that
+    /// leave the picture do not count.
+    pub(super) fn strength(&self, supposed: &Supposition) -> (f64, usize) {
+        let (mut sum, mut count) = (0.0, 0);
+        for point in &self.points {
+            if let Some(strength) = self.sample(self.place_in_colour(point, supposed)) {
+                sum += f64::from(strength);
+                count += 1;
+            }
+        }
+        (sum, count)
+    }
+
+    /// Where a jump of depth should lie in the picture, pixels.
+    fn place_in_colour(&self, point: &EdgePoint, supposed: &Supposition) -> [f64; 2] {
+        let height = self.height as f64;
+        let size = [self.width as f64, height];
+        // Both times count from the timestamp of colour. Only the difference of the rows' times is supposed.
+        let time_of_depth = self.stamp + supposed.delay;
+        let way = |axis: usize, time: f64| {
+            point.velocity[axis] * time + 0.5 * point.acceleration[axis] * time * time
+        };
+        let moved =
+            |time: f64| [0, 1].map(|axis| point.place[axis] + way(axis, time) - way(axis, time_of_depth));
+        // The row decides the time and the time the row; a second look is enough.
+        let time_of_row = |row: f64| supposed.rows * ((row + 0.5) / height - 0.5);
+        let near = moved(time_of_row(point.place[1]));
+        let place = moved(time_of_row(near[1]));
+        [0, 1].map(|axis| {
+            place[axis] + supposed.shift[axis] + supposed.zoom * (point.place[axis] + 0.5 - 0.5 * size[axis])
+        })
+    }
+
+    /// Bilinear value of the gradient; none outside of the picture.
+    fn sample(&self, [u, v]: [f64; 2]) -> Option<f32> {
+        let inside = |x: f64, size: usize| x >= 0.0 && x < (size - 1) as f64;
+        if !inside(u, self.width) || !inside(v, self.height) {
+            return None;
+        }
+        let (column, row) = (u as usize, v as usize);
+        let (a, b) = ((u - column as f64) as f32, (v - row as f64) as f32);
+        let at = row * self.width + column;
+        let pair = |at: usize| self.gradient[at] + a * (self.gradient[at + 1] - self.gradient[at]);
+        let (upper, lower) = (pair(at), pair(at + self.width));
+        Some(upper + b * (lower - upper))
+    }
+}
+
+/// Places of jumps between the pixels of a row or of a column, and the raw depth of the near side.
+fn jumps(image: &RgbdFrame) -> Vec<([f64; 2], u16)> {
+    let (width, height) = (image.width, image.height);
+    let mut found = Vec::new();
+    for v in 0..height {
+        for u in 0..width {
+            let here = image.depth[v * width + u];
+            for [along_u, along_v] in [[REACH, 0], [0, REACH]] {
+                let (other_u, other_v) = (u + along_u, v + along_v);
+                if here == 0 || other_u >= width || other_v >= height {
+                    continue;
+                }
+                let there = image.depth[other_v * width + other_u];
+                let (near, far) = (here.min(there), here.max(there));
+                if near > 0 && f64::from(far) > (1.0 + MIN_JUMP) * f64::from(near) {
+                    let middle = [u as f64 + 0.5 * along_u as f64, v as f64 + 0.5 * along_v as f64];
+                    found.push((middle, near));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Magnitude of the gradient of the green channel, no more than [`STRONGEST`], smoothed by (1 2 1)/4 along both axes. 0 on
+/// the border.
+fn gradient(image: &RgbdFrame) -> Vec<f32> {
+    let (width, height) = (image.width, image.height);
+    let green = |at: usize| f32::from(image.rgb[3 * at + 1]);
+    let strength = |at: usize| {
+        let (u, v) = (at % width, at / width);
+        if u == 0 || v == 0 || u + 1 == width || v + 1 == height {
+            return 0.0;
+        }
+        let (along_u, along_v) = (green(at + 1) - green(at - 1), green(at + width) - green(at - width));
+        along_u.hypot(along_v).min(STRONGEST)
+    };
+    let magnitude: Vec<f32> = (0..width * height).map(strength).collect();
+    let smoothed = |values: &[f32], step: usize| {
+        let mut out = vec![0.0; values.len()];
+        for at in step..values.len().saturating_sub(step) {
+            out[at] = 0.25 * (values[at - step] + values[at + step]) + 0.5 * values[at];
+        }
+        out
+    };
+    smoothed(&smoothed(&magnitude, 1), width)
+}

@@ -60,6 +60,10 @@ const GAIN_RANGE: core::ops::Range<f32> = 0.12..8.0;
 const RESIDUAL_FLOOR: f32 = 0.5;
 const DEPTH_RESIDUAL_FLOOR: f32 = 5e-4;
 
+/// Residual above this is bad, whatever was usual before, nominal standard deviations: patches that do not match differ by
+/// their contrast, 30 and more. With a wrong response and jerky rows frames that match reach 16.
+const RESIDUAL_CEILING: f32 = 24.0;
+
 /// How far the pose can be trusted, and why no further.
 pub(super) fn judge(
     outcome: &LevelOutcome,
@@ -85,7 +89,7 @@ pub(super) fn judge(
     if residual > 4.0 && !depth_agrees {
         return lost(Doubt::Residual);
     }
-    if residual > 2.5 {
+    if residual > 2.5 || outcome.photometric_scale > RESIDUAL_CEILING {
         return weak(Doubt::Residual);
     }
     if evidence.inliers < 0.2 { weak(Doubt::Inliers) } else { (FrameStatus::Ok, None) }

@@ -47,6 +47,7 @@ mod text_lines;
 pub mod tracking;
 pub mod trajectory_file;
 pub mod triplane;
+mod uncertainty;
 mod whole_file;
 
 pub use binary_file::BinaryFileError;

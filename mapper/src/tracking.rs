@@ -14,6 +14,7 @@ use mba_tracker::{
 use crate::dataset::{Dataset, FrameError, RgbdFrame};
 use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
 use crate::trajectory_file::TimedExposure;
+use crate::uncertainty::Uncertainty;
 
 /// What can be chosen about the tracker; everything else follows from the data set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,6 +101,7 @@ pub fn track_dataset(
     let mut tracker = Tracker::new(&config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
     // The tracker counts the frames it was given, the run those of the data set.
     let mut given = Vec::with_capacity(dataset.len());
+    let mut uncertainty = Uncertainty::default();
     for index in 0..dataset.len() {
         let record = match track_frame(&mut tracker, dataset, index, given.last().copied()) {
             Ok((result, ms)) => {
@@ -113,7 +115,7 @@ pub fn track_dataset(
                     );
                     run.revise(revised, exposure, f64::from(revision.blur));
                 }
-                let record = record(&result, ms);
+                let record = FrameRecord { sigma_m: uncertainty.add(&result), ..record(&result, ms) };
                 run.push(timed_result(&result), record)?;
                 record
             }
@@ -219,6 +221,7 @@ pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
         residual: f64::from(result.residual),
         inliers: f64::from(result.inliers),
         gain: f64::from(result.brightness.gain),
+        sigma_m: None,
         reason: result.doubt.map(reason),
     }
 }
@@ -251,6 +254,7 @@ pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposu
         residual: f64::NAN,
         inliers: 0.0,
         gain: f64::NAN,
+        sigma_m: None,
         reason: Some(Reason::Skipped),
     };
     (exposure, record)

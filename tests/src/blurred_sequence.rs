@@ -148,6 +148,7 @@ impl BlurredSequence {
             residual: 0.01,
             inliers: 1.0,
             gain: 1.0,
+            sigma_m: None,
             reason: None,
         }
     }

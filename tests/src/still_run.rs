@@ -32,6 +32,7 @@ pub fn write(
             residual: 1.0,
             inliers: 1.0,
             gain: 1.0,
+            sigma_m: None,
             reason: None,
         };
         writer.push(TimedExposure { timestamp: *timestamp, start, mid, end }, record).expect("a frame");

@@ -34,6 +34,7 @@ mod tests {
             residual: 0.01,
             inliers: 1.0,
             gain: 1.0,
+            sigma_m: None,
             reason: None,
         }
     }

@@ -43,6 +43,10 @@ pub struct FrameRecord {
     pub inliers: f64,
     /// Brightness factor against the keyframe.
     pub gain: f64,
+    /// Standard deviation of the position at mid exposure relative to the first frame, all axes together, metres; none
+    /// where it was not tracked, and in runs of versions that did not say it.
+    #[serde(default)]
+    pub sigma_m: Option<f64>,
     /// Why the frame is weak or lost; none for one that is ok, and in runs of versions that did not say it.
     #[serde(default)]
     pub reason: Option<Reason>,
@@ -94,7 +98,7 @@ impl Reason {
 }
 
 /// The header of the table.
-const COLUMNS: [&str; 11] = [
+const COLUMNS: [&str; 12] = [
     "timestamp",
     "status",
     "keyframe",
@@ -105,6 +109,7 @@ const COLUMNS: [&str; 11] = [
     "residual",
     "inliers",
     "gain",
+    "sigma_m",
     "reason",
 ];
 
@@ -119,7 +124,7 @@ pub(super) fn format_frames(frames: &[FrameRecord]) -> String {
             FrameStatus::Lost => "lost",
         };
         text.push_str(&format!(
-            "{:.6},{status},{},{:.3},{:.3},{},{},{:.6},{:.4},{:.4},{}\n",
+            "{:.6},{status},{},{:.3},{:.3},{},{},{:.6},{:.4},{:.4},{},{}\n",
             f.timestamp,
             f.keyframe,
             f.ms,
@@ -129,6 +134,7 @@ pub(super) fn format_frames(frames: &[FrameRecord]) -> String {
             f.residual,
             f.inliers,
             f.gain,
+            f.sigma_m.map_or(String::new(), |sigma| format!("{sigma:.6}")),
             f.reason.map_or("", Reason::name)
         ));
     }

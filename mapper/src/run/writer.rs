@@ -336,6 +336,7 @@ mod tests {
             residual: if lost { f64::NAN } else { 0.015625 },
             inliers: 0.75,
             gain: 1.0,
+            sigma_m: None,
             reason: None,
         };
         (exposure, record)
@@ -369,7 +370,7 @@ mod tests {
         assert!(run.frames[2].residual.is_nan());
         let header = fs::read_to_string(folder.path().join("frames.csv")).unwrap();
         assert!(header.starts_with(
-            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain,reason\n"
+            "timestamp,status,keyframe,ms,blur_px,virtual_views,iterations,residual,inliers,gain,sigma_m,reason\n"
         ));
     }
 

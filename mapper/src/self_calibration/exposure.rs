@@ -139,10 +139,10 @@ mod tests {
     #[test]
     fn lost_neighbours_and_stillness_say_nothing() {
         let mut tracked = shaken(5);
-        assert!(velocity(&tracked, 2).is_some());
+        assert!(motion(&tracked, 2).is_some());
         tracked[3].is_found = false;
-        assert!(velocity(&tracked, 2).is_none());
-        assert!(velocity(&tracked, 0).is_none(), "no frame before the first");
+        assert!(motion(&tracked, 2).is_none());
+        assert!(motion(&tracked, 0).is_none(), "no frame before the first");
         let still: Vec<Tracked> = shaken(20)
             .into_iter()
             .map(|frame| Tracked { world_from_mid: RigidTransform::identity(), ..frame })

@@ -20,6 +20,7 @@ fn record(timestamp: f64, status: FrameStatus) -> FrameRecord {
         residual,
         inliers: 0.9,
         gain: 1.0,
+        sigma_m: None,
         reason: None,
     }
 }

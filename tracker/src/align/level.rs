@@ -1,7 +1,7 @@
 //! Alignment on one pyramid level.
 
 use fearless_simd::Level;
-use nalgebra::{SMatrix, SVector, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 use super::damping::Damping;
 use super::measure::{NOMINAL_PHOTON_VARIANCE, measure_depth, measure_photometric, nominal_model};
@@ -54,6 +54,9 @@ pub struct LevelOutcome {
     pub patches_in_view: usize,
     /// Depth points that took part.
     pub depth_points: usize,
+    /// How far picture and depth are apart about the pose: the square of their difference over what their noise explains,
+    /// 1 on average where only noise sets them apart; 0 without depth term.
+    pub disagreement: f64,
     /// Gauss-Newton matrix at the estimate in (centre, motion, gain, offset) coordinates; where the bow is an unknown
     /// too, for any bow.
     pub information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
@@ -74,6 +77,7 @@ impl LevelOutcome {
             patches: 0,
             patches_in_view: 0,
             depth_points: 0,
+            disagreement: 0.0,
             information: SMatrix::zeros(),
         }
     }
@@ -215,6 +219,52 @@ enum Descent {
     Moved,
 }
 
+/// Ends a descent for good, and tells how well picture and depth agree there.
+fn stopped(
+    at: &Linearised,
+    objective: &Objective,
+    outcome: &mut LevelOutcome,
+    reason: StopReason,
+) -> Descent {
+    let timing = &objective.frame.timing;
+    outcome.disagreement = disagreement(at, &outcome.estimate, timing.depth_time);
+    Descent::Stopped(reason)
+}
+
+/// Share of what is known about a pose that the picture knows at the least.
+const LEAST_SHARE: f64 = 0.1;
+
+/// See [`LevelOutcome::disagreement`]; `depth_time` is the normalised time from the middle of the path.
+///
+/// At the best pose the gradients of picture and depth cancel. Each alone would move the pose by its own covariance times
+/// its gradient, so that `g (P_picture + P_depth) g / 6` is their difference in units of its own covariance. Both are
+/// about the pose when depth was measured; that of the picture follows from that of all, less what depth adds.
+#[inline(never)]
+fn disagreement(at: &Linearised, estimate: &Estimate, depth_time: f64) -> f64 {
+    let mut to_camera = Matrix6::identity();
+    let turn = estimate.keyframe_from_camera.mid().rotation_matrix().transpose();
+    to_camera.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
+    let by_depth = to_camera * at.depth_pose.0 * to_camera.transpose();
+    let gradient = to_camera * at.depth_pose.1;
+    let Some(covariance) = at.hessian.try_inverse() else { return 0.0 };
+    // Unknowns that move the pose when depth was measured: centre, motion and bow, with their shares.
+    let shares = [(0, 1.0), (6, depth_time), (UNKNOWNS, depth_time * depth_time)];
+    let mut of_all = Matrix6::zeros();
+    for (i, a) in shares {
+        for (j, b) in shares {
+            of_all += covariance.fixed_view::<6, 6>(i, j) * (a * b);
+        }
+    }
+    let Some(by_all) = of_all.try_inverse() else { return 0.0 };
+    let step = |information: Matrix6<f64>| information.cholesky().map(|factor| factor.solve(&gradient));
+    // Where the picture says next to nothing about that pose, rounding decides what is left of it.
+    let of_picture = step(by_all - by_depth).or_else(|| step(by_all * LEAST_SHARE));
+    match (of_picture, step(by_depth)) {
+        (Some(of_picture), Some(of_depth)) => gradient.dot(&(of_picture + of_depth)).max(0.0) / 6.0,
+        _ => 0.0,
+    }
+}
+
 /// Steps downhill with fixed patches. Every candidate is linearised at once: most are accepted, and then the next
 /// step needs no further evaluation.
 fn descend(
@@ -232,15 +282,15 @@ fn descend(
         outcome.information = without_bow(&at.hessian);
         outcome.depth_points = at.depth_points as usize;
         let Some(step) = damping.step(&at.hessian, &at.gradient) else {
-            return Descent::Stopped(StopReason::Singular);
+            return stopped(&at, objective, outcome, StopReason::Singular);
         };
         let pixels = step_in_pixels(&step, &objective.camera, objective.inverse_depth);
         if pixels < plan.min_step {
             outcome.estimate = outcome.estimate.stepped(&step);
-            return Descent::Stopped(StopReason::SmallStep);
+            return stopped(&at, objective, outcome, StopReason::SmallStep);
         }
         if outcome.iterations >= plan.max_iterations {
-            return Descent::Stopped(StopReason::IterationLimit);
+            return stopped(&at, objective, outcome, StopReason::IterationLimit);
         }
         let candidate = outcome.estimate.stepped(&step);
         let next = objective.linearise(&candidate, Some((at.pixels, at.depth_compared)), costs);
@@ -256,7 +306,7 @@ fn descend(
                 return Descent::Moved;
             }
         } else if !damping.reject() {
-            return Descent::Stopped(StopReason::NoDecrease);
+            return stopped(&at, objective, outcome, StopReason::NoDecrease);
         }
     }
 }

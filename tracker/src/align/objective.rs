@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 use core::ops::Range;
 use fearless_simd::Level;
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector6};
 
 use super::depth_term::{DepthProblem, DepthSums};
 use super::placement::MAX_BANDS;
@@ -101,6 +101,8 @@ pub(super) struct Linearised {
     pub gradient: SVector<f64, BOWED_UNKNOWNS>,
     /// Photometric pixels that took part.
     pub pixels: f64,
+    /// What the depth term alone says about the camera's pose: matrix and gradient in left rotations.
+    pub depth_pose: (Matrix6<f64>, Vector6<f64>),
     /// Depth points that took part.
     pub depth_points: f64,
     /// Depth points that were compared, within the gate or beyond.
@@ -187,6 +189,8 @@ impl Objective<'_> {
         let bowed = self.frame.timing.reaches_outside();
         for (of_band, weights) in &parts {
             sums.cost += weight * of_band.cost;
+            sums.depth_pose.0 += of_band.hessian * weight;
+            sums.depth_pose.1 += of_band.gradient * weight;
             // Symmetric: the columns are spread like the rows, after transposing.
             let spread = weights.rows(&(of_band.hessian * weight)).transpose();
             let block = weights.rows(&spread);
@@ -218,6 +222,7 @@ impl Objective<'_> {
             hessian: SMatrix::zeros(),
             gradient: SVector::zeros(),
             pixels: 0.0,
+            depth_pose: (Matrix6::zeros(), Vector6::zeros()),
             depth_points: 0.0,
             depth_compared: 0.0,
         };

@@ -102,6 +102,9 @@ pub struct FrameResult {
     /// Inverse covariance of (centre motion, exposure motion, gain, offset) as the objective sees it: translation
     /// in keyframe axes in metres, rotation in the camera in radians.
     pub information: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+    /// How far picture and depth are apart about the pose: the square of their difference over what their noise explains;
+    /// 1 on average where only noise sets them apart, far above where depth has another time or place than is supposed.
+    pub disagreement: f64,
     /// Brightness relative to the reference.
     pub brightness: BrightnessModel,
     /// Mean blur length in pixels.
@@ -145,6 +148,7 @@ impl FrameResult {
             world_from_mid: world_from_camera.mid(),
             world_from_camera,
             information: outcome.information,
+            disagreement: outcome.disagreement,
             brightness: outcome.estimate.brightness,
             blur: 0.0,
             virtual_views: outcome.views,

@@ -4,6 +4,7 @@
 //! `MBA_KILLS=N cargo test --release -p mba-tests --test cli kill` kills every command at least `N` times.
 
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::sleep;
@@ -41,7 +42,8 @@ impl Campaign<'_> {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mba-under-test"));
         // A checkpoint as often as can be: as many different states as can be are gone on from.
         command.args(self.words).args(["--checkpoint-interval", "0", "--resume", "--out", out]);
-        command.current_dir(self.folder).stdout(Stdio::null()).stderr(Stdio::null());
+        let said = File::create(self.folder.join("said")).unwrap();
+        command.current_dir(self.folder).stdout(Stdio::null()).stderr(said);
         command
     }
 
@@ -51,7 +53,8 @@ impl Campaign<'_> {
         let started = Instant::now();
         while started.elapsed().as_secs_f64() < seconds {
             if let Some(status) = process.try_wait().unwrap() {
-                assert!(status.success(), "{:?}: {status}", self.words);
+                let said = std::fs::read_to_string(self.folder.join("said")).unwrap();
+                assert!(status.success(), "{:?}: {status}\n{said}", self.words);
                 return true;
             }
             sleep(Duration::from_millis(2));
@@ -89,7 +92,8 @@ fn campaign(folder: &Path, words: &[&str], kills: u32, seed: u64) -> [u32; 2] {
     campaign.seconds = started.elapsed().as_secs_f64();
     let mut random = Pcg32::seed_from_u64(seed);
     let (mut killed, mut ended) = (0, 0);
-    while killed < kills || ended == 0 {
+    // The last part is not disturbed, so that what was killed last ends too.
+    while killed < kills || folder.join("out").exists() {
         let share = if killed < kills { f64::from(random.next_u32()) / f64::from(u32::MAX) } else { 1e3 };
         let has_ended = campaign.part(share * LONGEST_PART * campaign.seconds);
         killed += u32::from(!has_ended);

@@ -97,13 +97,16 @@ pub fn track_dataset(
 ) -> Result<(), TrackingError> {
     let config = tracker_config(dataset, options);
     config.validate().map_err(TrackingError::Camera)?;
-    let mut memory = vec![0; config.workspace_len()];
-    let mut tracker = Tracker::new(&config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
+    // Without images the size of the camera is a mere claim, for which no memory is taken.
+    let has_images = dataset.has_images();
+    let mut memory = vec![0; if has_images { config.workspace_len() } else { 0 }];
+    let tracker = has_images.then(|| Tracker::new(&config, SimdLevel::new(), &mut memory)).transpose();
+    let mut tracker = tracker.map_err(TrackingError::Camera)?;
     // The tracker counts the frames it was given, the run those of the data set.
     let mut given = Vec::with_capacity(dataset.len());
     let mut uncertainty = Uncertainty::default();
     for index in 0..dataset.len() {
-        let record = match track_frame(&mut tracker, dataset, index, given.last().copied()) {
+        let record = match track_frame(tracker.as_mut(), dataset, index, given.last().copied()) {
             Ok((result, ms)) => {
                 given.push(index);
                 if let Some(revision) = &result.revision {
@@ -141,15 +144,18 @@ enum SkipReason {
     Unreadable(#[from] FrameError),
     #[error(transparent)]
     Unusable(#[from] TrackError),
+    #[error("there were no images when the data set was opened")]
+    NoImages,
 }
 
 fn track_frame(
-    tracker: &mut Tracker<'_>,
+    tracker: Option<&mut Tracker<'_>>,
     dataset: &Dataset,
     index: usize,
     previous: Option<usize>,
 ) -> Result<(FrameResult, f64), SkipReason> {
     let image = dataset.frame(index)?;
+    let tracker = tracker.ok_or(SkipReason::NoImages)?;
     let mut frame = tracker_view(&image)?;
     add_gyroscope(&mut frame, dataset, previous);
     let begin = Instant::now();

@@ -57,7 +57,7 @@ pub enum Difference {
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Program => "written by another version of the program",
+            Self::Program => "written by another command or another version of the program",
             Self::Dataset => "of another data set",
             Self::Trajectory => "of a run that started from another trajectory",
             Self::Settings => "of a run with other settings",

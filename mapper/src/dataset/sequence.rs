@@ -1,5 +1,6 @@
 //! An opened data set: a list of frames that are decoded on demand.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use mba_tracker::geometry::PinholeCamera;
@@ -68,6 +69,9 @@ pub(super) struct Contents {
 struct ImageSource {
     size: (usize, usize),
     map: Option<Vec<SourcePosition>>,
+    /// Whether there was any image when the data set was opened. Without one the size is a mere claim, for which no map is
+    /// made.
+    is_there: bool,
 }
 
 impl Dataset {
@@ -78,10 +82,10 @@ impl Dataset {
         let camera = calibration.camera;
         let captured = colour_camera.unwrap_or(camera);
         // Before the maps: their memory follows from sizes that may be wrong.
-        check_first_size(entries.iter().map(|entry| &entry.colour), size(&captured))?;
-        check_first_size(entries.iter().map(|entry| &entry.depth), size(&camera))?;
-        let colour = ImageSource::new(&calibration, &captured);
-        let depth = ImageSource::new(&calibration, &camera);
+        let has_colour = check_first_size(entries.iter().map(|entry| &entry.colour), size(&captured))?;
+        let has_depth = check_first_size(entries.iter().map(|entry| &entry.depth), size(&camera))?;
+        let colour = ImageSource::new(&calibration, &captured, has_colour);
+        let depth = ImageSource::new(&calibration, &camera, has_depth);
         let whole = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
         let region = colour.map.as_ref().map_or(whole, |map| region_with_source(map, camera.width));
         let mut dataset = Self {
@@ -186,6 +190,13 @@ impl Dataset {
         &self.calibration
     }
 
+    /// Whether there was any colour and any depth image when the data set was opened. If not, no frame can be read, and
+    /// the size in the calibration is a mere claim.
+    #[must_use]
+    pub fn has_images(&self) -> bool {
+        self.colour.is_there && self.depth.is_there
+    }
+
     /// The rectangle of each frame in which every pixel stems from the stored image; smaller than the frame only
     /// where undistortion leaves black borders, which must not be taken for edges.
     #[must_use]
@@ -238,6 +249,8 @@ impl Dataset {
         let entry = self.entries.get(index).ok_or(FrameError::IndexOutOfRange { index, len })?;
         let rgb = self.colour.undistort_colour(read_colour(&entry.colour, self.colour.size)?);
         let depth = self.depth.undistort_depth(read_depth(&entry.depth, self.depth.size)?);
+        self.colour.check(&entry.colour)?;
+        self.depth.check(&entry.depth)?;
         Ok(RgbdFrame {
             index,
             timestamp: entry.timestamp,
@@ -275,7 +288,8 @@ impl Dataset {
     pub fn light_falloff(&self) -> Option<Vec<f32>> {
         let Calibration { vignetting, camera, .. } = &self.calibration;
         let source = self.colour.map.as_deref();
-        (!vignetting.is_none()).then(|| falloff_of_pixels(vignetting, camera, self.colour.size, source))
+        (self.colour.is_there && !vignetting.is_none())
+            .then(|| falloff_of_pixels(vignetting, camera, self.colour.size, source))
     }
 
     /// Whatever is odd about the data set.
@@ -362,15 +376,24 @@ impl Dataset {
 }
 
 impl ImageSource {
-    fn new(calibration: &Calibration, captured: &PinholeCamera) -> Self {
+    fn new(calibration: &Calibration, captured: &PinholeCamera, is_there: bool) -> Self {
         let ideal = &calibration.camera;
         let size = size(captured);
-        if calibration.distortion.is_none() && captured == ideal {
-            return Self { size, map: None };
+        if calibration.distortion.is_none() && captured == ideal || !is_there {
+            return Self { size, map: None, is_there };
         }
         let mut map = vec![[0.0; 2]; ideal.width * ideal.height];
         let filled = fill_source_map(ideal, captured, &calibration.distortion, &mut map);
-        Self { size, map: filled.ok().map(|()| map) }
+        Self { size, map: filled.ok().map(|()| map), is_there }
+    }
+
+    /// Refuses images that have come since the data set was opened: there may be no map for them.
+    fn check(&self, path: &Path) -> Result<(), FrameError> {
+        if self.is_there || !path.is_file() {
+            return Ok(());
+        }
+        let reason = io::Error::other("no such image could be read when the data set was opened");
+        Err(FrameError::Unreadable { path: path.to_owned(), reason })
     }
 
     fn undistort_colour(&self, stored: Vec<u8>) -> Vec<u8> {
@@ -427,16 +450,17 @@ fn size(camera: &PinholeCamera) -> (usize, usize) {
     (camera.width, camera.height)
 }
 
-/// Compares the first readable image with the calibration, so that a wrong calibration is found before any work.
+/// Compares the first readable image with the calibration, so that a wrong calibration is found before any work; says
+/// whether there is one.
 fn check_first_size<'a>(
     mut paths: impl Iterator<Item = &'a PathBuf>,
     expected: (usize, usize),
-) -> Result<(), DatasetError> {
+) -> Result<bool, DatasetError> {
     match paths.find_map(|path| image_size(path).map(|found| (path, found))) {
         Some((path, found)) if found != expected => {
             Err(DatasetError::SizeMismatch { path: path.clone(), found, expected })
         }
-        _ => Ok(()),
+        first => Ok(first.is_some()),
     }
 }
 

@@ -32,13 +32,18 @@ pub fn write_deblurred_keyframes(
     run: &mut RunWriter,
     observe: impl Fn() + Sync,
 ) -> Result<(), RunError> {
+    let keyframes = run.keyframes();
+    // Threads would make their memory all the same.
+    if keyframes.is_empty() {
+        return Ok(());
+    }
     let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
     let write = |memory: &mut DeblurMemory, (index, exposure): (usize, TimedExposure)| {
         let written = write_keyframe(dataset, &deblurrer, run, index, &exposure, memory);
         observe();
         (index, written)
     };
-    let outcomes: Vec<_> = run.keyframes().into_par_iter().map_init(|| deblurrer.memory(), write).collect();
+    let outcomes: Vec<_> = keyframes.into_par_iter().map_init(|| deblurrer.memory(), write).collect();
     for (index, outcome) in outcomes {
         match outcome {
             Ok(()) => run.count_deblurred(),

@@ -60,6 +60,10 @@ pub fn run_slam(
 ) -> Result<Summary, SlamError> {
     let config = tracker_config(dataset, &settings.tracking());
     config.validate().map_err(TrackingError::Camera)?;
+    // Without images the size of the camera is a mere claim, for which no memory is taken.
+    if !dataset.has_images() {
+        return Err(MapError::NoDepth.into());
+    }
     // Frames that come by their times do not come again.
     let keeps = settings.arrival == Arrival::LockStep;
     let path = out.path().join(CHECKPOINT_FILE);

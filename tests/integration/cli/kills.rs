@@ -8,9 +8,10 @@ use std::time::Instant;
 
 use mba_tests::tree::{Item, tree};
 
+use super::kill_campaign::kills;
 use super::{Workplace, mba};
 
-/// Kills per command, spread over the time that it takes.
+/// Kills per command, spread over the time that it takes, unless the environment asks for more.
 const KILLS: u32 = 12;
 
 /// A command that writes `out`.
@@ -76,9 +77,10 @@ fn what_a_kill_leaves_is_whole_and_the_next_start_does_the_work() {
         let seconds = started.elapsed();
         let expected = files(&whole);
         let is_timed = |path: &Path| timed.iter().any(|name| path == Path::new(name));
-        for k in 0..KILLS {
+        let kills = kills(KILLS);
+        for k in 0..kills {
             let mut process = program(&folder, &words, "out.ply").spawn().unwrap();
-            sleep(seconds.mul_f64(f64::from(k) / f64::from(KILLS)));
+            sleep(seconds.mul_f64(f64::from(k) / f64::from(kills)));
             process.kill().unwrap();
             process.wait().unwrap();
             // A data set is complete, and not written again, as soon as it has its calibration.

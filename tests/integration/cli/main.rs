@@ -7,6 +7,8 @@ mod eval_images;
 mod interrupts;
 mod keyframes;
 #[cfg(unix)]
+mod kill_campaign;
+#[cfg(unix)]
 mod kills;
 mod map;
 mod mesh;

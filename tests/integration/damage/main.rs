@@ -17,7 +17,7 @@ use std::thread;
 
 use mba_tests::tree::{copy, differences, tree};
 use mutation::{Mutation, of_any_file, of_png, of_text};
-use place::{Outcome, mba, pristine};
+use place::{Outcome, mba, mba_within, pristine};
 
 /// Random mutations of every file unless the environment asks for more.
 const FLIPS: u32 = 6;
@@ -37,6 +37,8 @@ enum Kind {
     Text,
     Binary,
     Png,
+    /// A binary file with a checksum, which random damage can have made right again.
+    Checkpoint,
 }
 
 const INFO: &[&str] = &["info", "data"];
@@ -65,6 +67,24 @@ const EVAL_TRAJECTORY: &[&str] =
     &["eval", "trajectory", "--reference", "data/groundtruth.txt", "--estimate", "run/trajectory.txt"];
 const EVAL_IMAGES: &[&str] = &["eval", "images", "--reference", "images", "--estimate", "others"];
 const RESUME: &[&str] = &["map", "data", "--trajectory", "run", "--out", "stopped", "--resume"];
+const RESUME_SLAM: &[&str] = &[
+    "slam",
+    "data",
+    "--out",
+    "stopped_slam",
+    "--resume",
+    "--max-gaussians",
+    "60",
+    "--time-budget",
+    "0.05",
+    "--self-calibrate",
+    "off",
+];
+const MAP_OF_ESTIMATES: &[&str] =
+    &["map", "data", "--trajectory", "estimated", "--out", "out", "--time-budget", "0.05"];
+const INFO_OF_REPLICA: &[&str] = &["info", "replica"];
+const INFO_OF_SCANNET: &[&str] = &["info", "scannet"];
+const MESH: &[&str] = &["mesh", "mapped", "--out", "out.ply", "--voxel-cm", "20"];
 const MAP: &[&str] = &["map", "data", "--trajectory", "run", "--out", "out", "--time-budget", "0.05"];
 const TRACK: &[&str] = &["track", "data", "--out", "out"];
 const REPORT: &[&str] = &["report", "run", "--dataset", "data"];
@@ -81,6 +101,10 @@ const fn png(file: &'static str, command: &'static [&'static str]) -> Subject {
     Subject { file, kind: Kind::Png, command }
 }
 
+const fn checkpoint(file: &'static str, command: &'static [&'static str]) -> Subject {
+    Subject { file, kind: Kind::Checkpoint, command }
+}
+
 const SUBJECTS: &[Subject] = &[
     text("data/associations.txt", INFO),
     text("listed/rgb.txt", INFO_OF_LISTS),
@@ -92,6 +116,13 @@ const SUBJECTS: &[Subject] = &[
     text("data/exposures.csv", INFO),
     text("data/response.txt", INFO),
     text("data/gyro.csv", INFO),
+    text("data/imu.csv", INFO),
+    text("data/imu0/data.csv", INFO),
+    text("data/accelerometer.txt", INFO),
+    text("replica/traj.txt", INFO_OF_REPLICA),
+    text("replica/cam_params.json", INFO_OF_REPLICA),
+    text("scannet/intrinsic/intrinsic_color.txt", INFO_OF_SCANNET),
+    text("scannet/pose/1.txt", INFO_OF_SCANNET),
     png("data/rgb/000000.png", INFO),
     binary("data/rgb/000002.jpg", INFO),
     png("data/depth/000003.png", INFO),
@@ -101,6 +132,8 @@ const SUBJECTS: &[Subject] = &[
     text("run/exposures.txt", EVAL_EXPOSURES),
     text("run/exposures.txt", MAP),
     text("run/frames.csv", MAP),
+    text("estimated/calibration_estimated.toml", MAP_OF_ESTIMATES),
+    text("estimated/exposures_estimated.csv", MAP_OF_ESTIMATES),
     text("run/summary.json", REPORT),
     text("mapped/summary.json", RENDER),
     text("mapped/exposures.txt", RENDER),
@@ -112,7 +145,9 @@ const SUBJECTS: &[Subject] = &[
     binary("data/surface_points.ply", EVAL_MESH),
     png("images/000000.png", EVAL_IMAGES),
     png("others/000001.png", EVAL_IMAGES),
-    binary("stopped/checkpoint", RESUME),
+    binary("mapped/map.ply", MESH),
+    checkpoint("stopped/checkpoint", RESUME),
+    checkpoint("stopped_slam/checkpoint", RESUME_SLAM),
 ];
 
 impl Subject {
@@ -121,6 +156,7 @@ impl Subject {
         match self.kind {
             Kind::Text => mutations.extend(of_text()),
             Kind::Png => mutations.extend(of_png()),
+            Kind::Checkpoint => mutations.extend((0..4 * flips).map(Mutation::Forged)),
             Kind::Binary => {}
         }
         mutations
@@ -131,6 +167,8 @@ impl Subject {
         let own = match self.command[0] {
             "report" => ["run/plots", "run/report.html"],
             "map" if self.command.contains(&"stopped") => ["stopped", "stopped"],
+            "slam" => ["stopped_slam", "stopped_slam"],
+            "mesh" => ["out.ply", "out.ply"],
             _ => ["out", "out"],
         };
         own.iter().any(|own| path.starts_with(own))
@@ -156,8 +194,8 @@ fn attempt(folder: &Path, good: &Path, subject: &Subject, mutation: Mutation) ->
     changed.retain(|path| !subject.may_change(path));
     let verdict = judge(&outcome, subject, &changed);
     // A map that was resumed in spite of the damage has replaced the file itself.
-    for name in ["out", "stopped", "run", "data"] {
-        let _ = fs::remove_dir_all(folder.join(name));
+    for name in ["out", "out.ply", "stopped", "stopped_slam", "run", "data"] {
+        remove(&folder.join(name));
         if good.join(name).exists() {
             copy(&good.join(name), &folder.join(name));
         }
@@ -236,4 +274,24 @@ fn every_file_survives_every_damage() {
     assert!(failures.is_empty(), "{} of {}:\n{}", failures.len(), cases.len(), failures.join("\n"));
     let kinds: BTreeSet<&str> = SUBJECTS.iter().map(|subject| subject.file).collect();
     assert!(kinds.len() >= 25 && codes[2] > codes[0] / 4, "the damage does not reach the readers: {codes:?}");
+}
+
+/// A calibration can claim any size; without images of that size there is nothing to make room for.
+#[test]
+fn a_size_that_no_image_has_takes_no_memory() {
+    let place = tempfile::tempdir().unwrap();
+    let data = place.path().join("data");
+    fs::create_dir(&data).unwrap();
+    let calibration = "width = 8000\nheight = 8000\nfx = 5000\nfy = 5000\ncx = 4000\ncy = 4000\n\
+         distortion = [0.01, 0, 0, 0, 0]\nvignetting = [-0.1, 0]\ndepth_scale = 1000\n";
+    fs::write(data.join("calibration.toml"), calibration).unwrap();
+    for images in ["rgb", "depth"] {
+        let list = format!("1 {images}/1.png\n2 {images}/2.png\n");
+        fs::write(data.join(images).with_extension("txt"), list).unwrap();
+    }
+    for words in [&["info", "data"][..], TRACK, &["slam", "data", "--out", "out"]] {
+        let Outcome { code, stderr, .. } = mba_within(place.path(), words, 300 << 10);
+        assert!(matches!(code, Some(1 | 2)) && !stderr.contains("panicked"), "{words:?}: {code:?}\n{stderr}");
+        assert!(stderr.contains("rgb/1.png"), "{words:?}: {stderr}");
+    }
 }

@@ -23,6 +23,8 @@ pub(crate) enum Mutation {
     Block(usize, u8),
     /// Up to eight random bytes have other values.
     Flips(u32),
+    /// The same in a checkpoint whose checksum was made right again.
+    Forged(u32),
     /// Lines in another order.
     Reversed,
     /// The first line of data twice.
@@ -118,6 +120,7 @@ impl Mutation {
                 bytes
             }
             Self::Flips(seed) => flipped(good, seed),
+            Self::Forged(seed) => forged(good, seed),
             Self::Reversed => text().lines().rev().map(|line| format!("{line}\n")).collect::<String>().into(),
             Self::LineTwice => {
                 let at = first_line_of_data(&text());
@@ -154,6 +157,18 @@ fn flipped(good: &[u8], seed: u32) -> Vec<u8> {
 }
 
 /// Index of the first line with a number that is no comment.
+/// A checkpoint with other content and the checksum of that: its header has 56 bytes, of which the last twelve are the
+/// length of what follows and the checksum.
+fn forged(good: &[u8], seed: u32) -> Vec<u8> {
+    let (header, content) = good.split_at(56.min(good.len()));
+    let mut bytes = [header, &flipped(content, seed)].concat();
+    if bytes.len() > 56 {
+        let checksum = crc32fast::hash(&[&bytes[12..52], &bytes[56..]].concat());
+        bytes[52..56].copy_from_slice(&checksum.to_le_bytes());
+    }
+    bytes
+}
+
 fn first_line_of_data(text: &str) -> usize {
     let is_data = |line: &str| !line.starts_with('#') && line.contains(|c: char| c.is_ascii_digit());
     text.lines().position(is_data).unwrap_or(0)

@@ -26,8 +26,13 @@ const TIME_LIMIT: usize = 60;
 
 /// Runs the program in `folder`.
 pub(crate) fn mba(folder: &Path, words: &[&str]) -> Outcome {
+    mba_within(folder, words, MEMORY_LIMIT)
+}
+
+/// Runs the program in `folder` with so many kibibytes of address space.
+pub(crate) fn mba_within(folder: &Path, words: &[&str], kibibytes: usize) -> Outcome {
     let started = Instant::now();
-    let limited = format!("ulimit -v {MEMORY_LIMIT}; exec timeout -s KILL {TIME_LIMIT} \"$0\" \"$@\"");
+    let limited = format!("ulimit -v {kibibytes}; exec timeout -s KILL {TIME_LIMIT} \"$0\" \"$@\"");
     let program = env!("CARGO_BIN_EXE_mba-under-test");
     let output = Command::new("sh")
         .args(["-c", &limited, program])
@@ -47,7 +52,8 @@ pub(crate) fn mba(folder: &Path, words: &[&str]) -> Outcome {
 /// Makes a folder with everything that a command can read:
 ///
 /// `data` and `listed` (data sets with and without associations), `run`, `mapped` (Gaussians), `field`, `stopped` (a
-/// checkpoint), `mesh.ply`, `poses.txt`, `images` and `others` (folders of images).
+/// checkpoint), `stopped_slam`, `estimated` (a run with what was found of the camera), `replica` and `scannet` (data sets in
+/// other layouts), `mesh.ply`, `poses.txt`, `images` and `others` (folders of images).
 pub(crate) fn pristine() -> TempDir {
     let sequence = BlurredSequence::tiny();
     let _ = sequence.run_of("run", sequence.truth());
@@ -63,7 +69,12 @@ pub(crate) fn pristine() -> TempDir {
         let made = mba(place.path(), &[&map[..], &[out, "--time-budget", "0.5", "--field", field]].concat());
         assert_eq!(made.code, Some(0), "{}", made.stderr);
     }
-    stop_a_map(place.path());
+    let map = ["map", "data", "--trajectory", "run", "--out", "stopped"];
+    stop(place.path(), "stopped", &map);
+    let slam = ["slam", "data", "--out", "stopped_slam", "--max-gaussians", "60", "--self-calibrate", "off"];
+    stop(place.path(), "stopped_slam", &slam);
+    other_layouts(place.path());
+    estimates(place.path());
     let mesh = mba(place.path(), &["mesh", "mapped", "--out", "mesh.ply", "--voxel-cm", "8"]);
     assert_eq!(mesh.code, Some(0), "{}", mesh.stderr);
     fs::create_dir(at("images")).unwrap();
@@ -94,6 +105,16 @@ fn complete_data_set(data: &Path) {
         .map(|k| format!("{:.6},0.1,{:.3},-0.2\n", f64::from(k) / 200.0 - 0.5, 1e-3 * f64::from(k)))
         .collect();
     fs::write(data.join("gyro.csv"), format!("timestamp,wx_rad_s,wy_rad_s,wz_rad_s\n{rates}")).unwrap();
+    let rows = |header: &str, row: &dyn Fn(f64) -> String| -> String {
+        format!("{header}\n") + &(0..60).map(|k| row(f64::from(k) / 50.0 - 0.5) + "\n").collect::<String>()
+    };
+    let named = "timestamp,wx_rad_s,wy_rad_s,wz_rad_s,ax_m_s2,ay_m_s2,az_m_s2";
+    fs::write(data.join("imu.csv"), rows(named, &|t| format!("{t:.6},0.1,0.2,-0.1,0.1,-9.8,0.2"))).unwrap();
+    fs::create_dir(data.join("imu0")).unwrap();
+    let euroc = |t: f64| format!("{},0.1,0.2,-0.1,0.1,-9.8,0.2", (1e9 * t) as i64);
+    fs::write(data.join("imu0/data.csv"), rows("#timestamp [ns],rates,forces", &euroc)).unwrap();
+    let kinect = rows("# timestamp ax ay az", &|t| format!("{t:.6} 0.1 -9.8 0.2"));
+    fs::write(data.join("accelerometer.txt"), kinect).unwrap();
     // One of the frames is a JPEG.
     let image = image::open(data.join("rgb/000002.png")).unwrap().into_rgb8();
     image.save(data.join("rgb/000002.jpg")).unwrap();
@@ -103,21 +124,61 @@ fn complete_data_set(data: &Path) {
     }
 }
 
-/// A run in `stopped` that was killed after its first checkpoint.
-fn stop_a_map(folder: &Path) {
-    let checkpoint: PathBuf = folder.join("stopped/checkpoint");
-    let words = ["map", "data", "--trajectory", "run", "--out", "stopped", "--checkpoint-interval", "0"];
+/// A run in `out` that was killed after its first checkpoint.
+fn stop(folder: &Path, out: &str, words: &[&str]) {
+    let checkpoint: PathBuf = folder.join(out).join("checkpoint");
     let mut process = Command::new(env!("CARGO_BIN_EXE_mba-under-test"))
         .args(words)
+        .args(["--checkpoint-interval", "0"])
         .current_dir(folder)
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
         .unwrap();
     while !checkpoint.is_file() {
-        assert!(process.try_wait().unwrap().is_none(), "it ended before there was a checkpoint");
+        assert!(process.try_wait().unwrap().is_none(), "{words:?} ended before there was a checkpoint");
         sleep(Duration::from_millis(2));
     }
     process.kill().unwrap();
     process.wait().unwrap();
+}
+
+/// The same recording as Replica and ScanNet have theirs.
+fn other_layouts(folder: &Path) {
+    let image = |images: &str, k: usize| folder.join(format!("data/{images}/{k:06}.png"));
+    let at = |name: &str| folder.join(name);
+    for name in ["replica/results", "scannet/color", "scannet/depth", "scannet/pose", "scannet/intrinsic"] {
+        fs::create_dir_all(at(name)).unwrap();
+    }
+    let row = |x: usize| format!("1 0 0 0.{x} 0 1 0 0 0 0 1 0 0 0 0 1");
+    let mut trajectory = String::new();
+    for k in 0..2 {
+        fs::copy(image("rgb", k), at(&format!("replica/results/frame{k:06}.png"))).unwrap();
+        fs::copy(image("depth", k), at(&format!("replica/results/depth{k:06}.png"))).unwrap();
+        fs::copy(image("rgb", k), at(&format!("scannet/color/{k}.png"))).unwrap();
+        fs::copy(image("depth", k), at(&format!("scannet/depth/{k}.png"))).unwrap();
+        trajectory += &(row(k) + "\n");
+        let matrix = format!("1 0 0 0.{k}\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+        fs::write(at(&format!("scannet/pose/{k}.txt")), matrix).unwrap();
+    }
+    fs::write(at("replica/traj.txt"), trajectory).unwrap();
+    let camera =
+        r#"{"camera": {"w": 64, "h": 48, "fx": 60.0, "fy": 60.0, "cx": 31.5, "cy": 23.5, "scale": 5000}}"#;
+    fs::write(at("replica/cam_params.json"), camera).unwrap();
+    for kind in ["color", "depth"] {
+        let matrix = "60 0 31.5 0\n0 60 23.5 0\n0 0 1 0\n0 0 0 1\n";
+        fs::write(at(&format!("scannet/intrinsic/intrinsic_{kind}.txt")), matrix).unwrap();
+    }
+}
+
+/// The run with files of what was found of the camera.
+fn estimates(folder: &Path) {
+    let at = |name: &str| folder.join(name);
+    copy(&at("run"), &at("estimated"));
+    let calibration = fs::read_to_string(at("data/calibration.toml")).unwrap();
+    let kept = calibration.lines().filter(|line| !line.starts_with("response"));
+    let text: String = kept.map(|line| format!("{line}\n")).collect();
+    fs::write(at("estimated/calibration_estimated.toml"), text + "estimated = [\"exposure\", \"readout\"]\n")
+        .unwrap();
+    fs::copy(at("data/exposures.csv"), at("estimated/exposures_estimated.csv")).unwrap();
 }

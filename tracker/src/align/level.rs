@@ -322,7 +322,8 @@ fn view_count(blur: f32, settings: &AlignSettings) -> usize {
     if blur < MIN_SAMPLED_BLUR {
         return 1;
     }
-    let wanted = (blur / settings.view_spacing) as usize + 1;
+    // A blur without end is a very long one.
+    let wanted = ((blur / settings.view_spacing) as usize).saturating_add(1);
     wanted.clamp(3, settings.max_views.max(3))
 }
 

@@ -135,6 +135,7 @@ fn true_run(dataset: &Dataset, folder: &Path) -> Run {
             residual: 0.01,
             inliers: 1.0,
             gain: 1.0,
+            sigma_m: None,
             reason: None,
         };
         writer.push(*exposure, record).expect("a writable folder");

@@ -30,7 +30,8 @@ const BRIGHTNESS_DOUBT: f64 = 1.25;
 /// Relative error of an exposure time that many frames share: of paths, and of the polynomial between poses.
 const SYSTEMATIC: f64 = 0.02;
 
-/// Rows that follow each other take longer than this, seconds; with less, depth rolls nearly as colour does.
+/// Rows that follow each other take longer than this, seconds. Less may be what the rows of colour take longer than those of
+/// depth, so that the readout is left to what fits best.
 const SHORTEST_READOUT: f64 = 6e-3;
 
 /// Relative error of a readout from edges: of the polynomial between poses, and of depth's own edges.
@@ -84,8 +85,6 @@ struct Estimates {
     readout: Option<Measured>,
     /// Seconds by which depth is later than its timestamps.
     depth_delay: Option<Measured>,
-    /// Whether the rows of depth take as long as those of colour.
-    depth_rolls: bool,
     /// Pixels that depth lies beside colour; none where the picture does not tell.
     depth_shift: Option<[f64; 2]>,
     /// Whether the frames say anything about the readout.
@@ -100,7 +99,6 @@ impl Estimates {
             exposures: None,
             readout: None,
             depth_delay: None,
-            depth_rolls: false,
             depth_shift: None,
             readout_was_sought: !readout_known,
         };
@@ -119,7 +117,6 @@ impl Estimates {
         let whole = range.len() == dataset.len();
         if !readout_known && found.readout.is_none() {
             found.readout = find_readout(&search, &mut guess, exposure_known, whole);
-            found.depth_rolls &= found.readout.is_some();
         }
         found.exposures = if exposure_known { None } else { find_exposures(&search, guess, whole) };
         found
@@ -138,18 +135,14 @@ impl Estimates {
                 self.depth_delay = Some(edges.delay);
                 guess.depth_delay = edges.delay.seconds;
             }
-            if self.readout_was_sought && edges.rows.is_certain() {
-                if edges.rows.differs_from_none() && edges.rows.seconds.abs() > SHORTEST_READOUT {
-                    // The motion that the edges are moved by is as uncertain as that of exposures.
-                    let systematic = READOUT_SYSTEMATIC * edges.rows.seconds;
-                    let sigma = edges.rows.sigma.hypot(systematic);
-                    self.readout = Some(Measured { sigma, ..edges.rows });
-                    guess.readout = edges.rows.seconds;
-                } else {
-                    self.depth_rolls = matches!(calibration.readout, Readout::Rolling { .. });
-                }
+            let follow_each_other =
+                edges.rows.differs_from_none() && edges.rows.seconds.abs() > SHORTEST_READOUT;
+            if self.readout_was_sought && follow_each_other {
+                // The motion that the edges are moved by is as uncertain as that of exposures.
+                let sigma = edges.rows.sigma.hypot(READOUT_SYSTEMATIC * edges.rows.seconds);
+                self.readout = Some(Measured { sigma, ..edges.rows });
+                guess.readout = edges.rows.seconds;
             }
-            guess.depth_rolls = self.depth_rolls;
             let Some(probe) = search.probe(vec![guess.clone()]).pop().filter(|_| guess != before) else {
                 break;
             };
@@ -164,10 +157,6 @@ impl Estimates {
         if let Some(found) = self.readout {
             calibration.readout = Readout::Rolling { seconds: Some(found.seconds) };
             calibration.sources.readout = Knowledge::Estimated;
-            if self.depth_rolls {
-                calibration.depth_readout_seconds = found.seconds;
-                calibration.sources.depth_delay = Knowledge::Estimated;
-            }
         }
         if let Some(found) = self.depth_delay {
             calibration.depth_clock_seconds = found.seconds;
@@ -229,12 +218,11 @@ impl Estimates {
                 note: note.into(),
             };
         };
-        let note = if self.depth_rolls { "of colour and of depth" } else { "" };
         Finding {
             fact: "readout",
             knowledge: Knowledge::Estimated,
             value: Some(Value { value: found.seconds, sigma: found.sigma, printed: MILLISECONDS }),
-            note: note.into(),
+            note: String::new(),
         }
     }
 

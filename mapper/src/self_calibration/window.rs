@@ -18,8 +18,6 @@ pub(super) struct Guess {
     pub(super) readout: f64,
     /// Added to the timestamps of depth, seconds.
     pub(super) depth_delay: f64,
-    /// Whether the rows of depth take as long as those of colour; otherwise they are measured together.
-    pub(super) depth_rolls: bool,
     /// Factor on the focal lengths on record.
     pub(super) focal_scale: f64,
 }
@@ -31,14 +29,8 @@ impl Guess {
             exposures: (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect(),
             readout: dataset.calibration().readout.readout_seconds().unwrap_or(0.0),
             depth_delay: 0.0,
-            depth_rolls: false,
             focal_scale: 1.0,
         }
-    }
-
-    /// Time from the first row of depth to the last, seconds.
-    pub(super) fn depth_readout(&self, dataset: &Dataset) -> f64 {
-        if self.depth_rolls { self.readout } else { dataset.calibration().depth_readout_seconds }
     }
 }
 
@@ -67,7 +59,6 @@ pub(super) struct Tracked {
 pub(super) fn config(dataset: &Dataset, options: &TrackingOptions, guess: &Guess) -> TrackerConfig {
     let mut config = tracker_config(dataset, options);
     config.readout.colour = guess.readout;
-    config.readout.depth = guess.depth_readout(dataset);
     config.readout.depth_apart |= guess.depth_delay != 0.0;
     config.camera.fx *= guess.focal_scale;
     config.camera.fy *= guess.focal_scale;

@@ -44,7 +44,7 @@ impl<'a> ColourView<'a> {
         stride: usize,
         format: PixelFormat,
     ) -> Result<Self, FrameError> {
-        let row = width * format.bytes();
+        let row = width.saturating_mul(format.bytes());
         check_extent(data.len(), row, height, stride)?;
         Ok(Self { data, width, height, stride, format })
     }

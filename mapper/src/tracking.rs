@@ -53,10 +53,20 @@ pub enum TrackingError {
 /// The tracker's configuration for a data set.
 #[must_use]
 pub fn tracker_config(dataset: &Dataset, options: &TrackingOptions) -> TrackerConfig {
+    reduced_tracker_config(dataset, options, 0)
+}
+
+/// The tracker's configuration for the frames of a data set with their resolution halved `level` times.
+pub(crate) fn reduced_tracker_config(
+    dataset: &Dataset,
+    options: &TrackingOptions,
+    level: usize,
+) -> TrackerConfig {
     let calibration = dataset.calibration();
     let metres_per_unit = (1.0 / calibration.depth_scale) as f32;
-    let mut config = TrackerConfig::new(calibration.camera, metres_per_unit, calibration.response.inverse());
-    config.region = dataset.region_with_source();
+    let camera = calibration.camera.at_level(level);
+    let mut config = TrackerConfig::new(camera, metres_per_unit, calibration.response.inverse());
+    config.region = dataset.region_with_source().at_level(level);
     config.reference = options.reference;
     config.align.blur = options.blur;
     config.align.depth_term = options.depth_term;

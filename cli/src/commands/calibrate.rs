@@ -84,7 +84,7 @@ pub fn completed(dataset: Dataset, switch: Switch, console: &Console) -> anyhow:
     if switch == Switch::Off || self_calibration::is_complete(&dataset) {
         return Ok(dataset);
     }
-    console.note("looking for what is not on record about the camera, which takes up to a minute");
+    console.note("looking for what is not on record about the camera, which takes some seconds");
     let (dataset, findings) = self_calibration::complete(dataset)?;
     let found: Vec<String> = findings.iter().map(ToString::to_string).collect();
     console.note(format!("found from the recording: {}", found.join("; ")));

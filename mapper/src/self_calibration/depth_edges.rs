@@ -98,6 +98,12 @@ impl EdgeFrame {
         self.points.len()
     }
 
+    /// Of the jumps, pixels per second.
+    pub(super) fn sum_of_squared_speeds(&self) -> f64 {
+        let square = |point: &EdgePoint| point.velocity[0].powi(2) + point.velocity[1].powi(2);
+        self.points.iter().map(square).sum()
+    }
+
     /// Keeps every `step`-th jump.
     pub(super) fn thin_out(&mut self, step: usize) {
         self.points = self.points.iter().step_by(step).copied().collect();

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::finding::{Finding, Value};
 use super::score::{advantage, misfits, parabola, trimmed_mean};
-use super::window::{Guess, Window};
+use super::window::{Guess, Recording};
 use crate::dataset::{Dataset, Knowledge};
 use crate::tracking::TrackingOptions;
 
@@ -26,10 +26,11 @@ const MIN_CERTAINTY: f64 = 1.5;
 #[must_use]
 pub fn focal_length(dataset: &Dataset) -> (Finding, Option<f64>) {
     let options = TrackingOptions::default();
-    let window = Window::read(dataset, 0..FRAMES.min(dataset.len()));
+    let recording = Recording { dataset, options: &options };
+    let frames = recording.read(0..FRAMES.min(dataset.len()), 0);
     let probe = |focal_scale: f64| {
         let guess = Guess { focal_scale, ..Guess::of(dataset) };
-        misfits(&window.track(dataset, &options, &guess))
+        misfits(&recording.track(&frames, 0, &guess))
     };
     let height = |misfits: &[f64]| trimmed_mean(misfits).map_or(f64::INFINITY, |mean| mean.median);
     let mut centre = 1.0;

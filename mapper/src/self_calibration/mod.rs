@@ -3,8 +3,8 @@
 //! Exposure times follow from motion: what moves within an exposure, over the velocity between the poses at mid exposure.
 //! They are tied to each other by the brightness of the frames. The readout time of a camera whose rows are exposed one
 //! after the other is the one with which the edges of colour lie on the jumps of depth; they also tell by how much depth
-//! is late. Where they do not, it is the one that explains the frames best: far from the truth nothing fits, so a stretch
-//! of the recording is tracked again and again with supposed values. What a recording cannot tell is said to be unknown.
+//! is late. A stretch of the recording is tracked again and again with what is supposed, until the motion agrees with it. What
+//! a recording cannot tell is said to be unknown.
 //!
 //! Sources: exposure from blur, e.g. Gong et al. (CasualHDRSplat), 2025; readout as an unknown of the camera, e.g. Kerl,
 //! Stueckler and Cremers, ICCV 2015.
@@ -14,12 +14,13 @@ mod complete;
 mod depth_edges;
 mod depth_time;
 mod exposure;
+mod exposure_times;
 mod finding;
 mod focal;
 mod motion;
+mod reduced;
 mod robust;
 mod score;
-mod search;
 mod stored;
 mod window;
 

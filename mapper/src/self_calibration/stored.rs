@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::search::SHORTEST;
+use super::exposure_times::SHORTEST;
 use crate::FileError;
 use crate::dataset::{
     CameraFact, Dataset, DatasetError, ExposureSource, Knowledge, read_calibration, read_exposure_times,

@@ -1,13 +1,17 @@
 //! A stretch of the recording that is tracked again and again.
 
+use std::borrow::Borrow;
 use std::ops::Range;
 
-use mba_tracker::geometry::RigidTransform;
+use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::trajectory::ExposureTrajectory;
 use mba_tracker::{FrameResult, FrameStatus, SimdLevel, Tracker, TrackerConfig};
+use rayon::prelude::*;
 
+use super::reduced::{reduced, usual_level};
+use super::robust::median;
 use crate::dataset::{Dataset, RgbdFrame};
-use crate::tracking::{TrackingOptions, tracker_config, tracker_view};
+use crate::tracking::{TrackingOptions, reduced_tracker_config, tracker_view};
 
 /// What is supposed about the camera while the window is tracked.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,18 +59,8 @@ pub(super) struct Tracked {
     pub(super) residual: f64,
 }
 
-/// Tracks frames of `dataset` with a supposed camera.
-pub(super) fn config(dataset: &Dataset, options: &TrackingOptions, guess: &Guess) -> TrackerConfig {
-    let mut config = tracker_config(dataset, options);
-    config.readout.colour = guess.readout;
-    config.readout.depth_apart |= guess.depth_delay != 0.0;
-    config.camera.fx *= guess.focal_scale;
-    config.camera.fy *= guess.focal_scale;
-    config
-}
-
 /// Tracks whatever `frames` gives with `config`; frames that cannot be used are left out.
-pub(super) fn track<T: std::borrow::Borrow<RgbdFrame>>(
+fn track<T: Borrow<RgbdFrame>>(
     frames: impl Iterator<Item = T>,
     config: &TrackerConfig,
     guess: &Guess,
@@ -107,26 +101,154 @@ impl Tracked {
     }
 }
 
-/// Frames in memory.
-#[derive(Debug)]
-pub(super) struct Window {
-    frames: Vec<RgbdFrame>,
+/// Frames of a window, at the most, and windows of a long recording of which the liveliest is taken.
+const WINDOW: usize = 60;
+const CANDIDATES: usize = 5;
+
+/// Frames that are decoded together.
+const CHUNK: usize = 32;
+
+/// A data set and how it is tracked.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Recording<'a> {
+    pub(super) dataset: &'a Dataset,
+    pub(super) options: &'a TrackingOptions,
 }
 
-impl Window {
-    /// Decodes the frames of `range`; unreadable ones are left out.
-    pub(super) fn read(dataset: &Dataset, range: Range<usize>) -> Self {
-        Self { frames: range.filter_map(|index| dataset.frame(index).ok()).collect() }
+/// Resolution of the frames that are tracked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Resolution {
+    /// As they were recorded, or not much more than 640 pixels wide.
+    Fine,
+    /// A quarter of those pixels: faster, for large motions.
+    Coarse,
+}
+
+impl<'a> Recording<'a> {
+    /// Decodes the frames of `range`, their resolution halved `level` times; unreadable ones are left out.
+    pub(super) fn read(&self, range: Range<usize>, level: usize) -> Vec<RgbdFrame> {
+        let read = |index| Some(reduced(self.dataset.frame(index).ok()?, level));
+        range.into_par_iter().filter_map(read).collect()
     }
 
-    /// The frame with this index of the data set; none if it is not in the window or was unreadable.
+    /// Tracks `frames`, whose resolution was halved `level` times, with a supposed camera.
+    pub(super) fn track(&self, frames: &[RgbdFrame], level: usize, guess: &Guess) -> Vec<Tracked> {
+        track(frames.iter(), &self.config(level, guess), guess)
+    }
+
+    /// Tracks the whole data set at coarse resolution; only a few frames are in memory at a time.
+    pub(super) fn track_everything(&self, guess: &Guess) -> Vec<Tracked> {
+        let (frames, level) = (self.dataset.len(), self.level(Resolution::Coarse));
+        let chunk = |start: usize| self.read(start..frames.min(start + CHUNK), level);
+        track((0..frames).step_by(CHUNK).flat_map(chunk), &self.config(level, guess), guess)
+    }
+
+    /// The stretch of the recording that turns most, tracked at coarse resolution.
+    pub(super) fn liveliest(&self, guess: &Guess) -> (Window<'a>, Vec<Tracked>) {
+        let stretches = stretches(self.dataset.len());
+        if let [whole] = &stretches[..] {
+            let window = Window::read(*self, whole.clone());
+            let tracked = window.track(Resolution::Coarse, guess);
+            return (window, tracked);
+        }
+        let level = self.level(Resolution::Coarse);
+        let try_one =
+            |range: Range<usize>| (self.track(&self.read(range.clone(), level), level, guess), range);
+        let tracked: Vec<(Vec<Tracked>, Range<usize>)> = stretches.into_iter().map(try_one).collect();
+        let best = tracked.into_iter().max_by(|a, b| liveliness(&a.0).total_cmp(&liveliness(&b.0)));
+        let (tracked, range) = best.unwrap_or_default();
+        (Window::read(*self, range), tracked)
+    }
+
+    /// How often the resolution is halved.
+    fn level(&self, resolution: Resolution) -> usize {
+        let coarse = usual_level(&self.dataset.calibration().camera);
+        match resolution {
+            Resolution::Fine => coarse.saturating_sub(1),
+            Resolution::Coarse => coarse,
+        }
+    }
+
+    fn config(&self, level: usize, guess: &Guess) -> TrackerConfig {
+        let mut config = reduced_tracker_config(self.dataset, self.options, level);
+        config.readout.colour = guess.readout;
+        config.readout.depth_apart |= guess.depth_delay != 0.0;
+        config.camera.fx *= guess.focal_scale;
+        config.camera.fy *= guess.focal_scale;
+        config
+    }
+}
+
+/// Stretches of a recording of so many frames of which one may become the window: all of it if it is short.
+fn stretches(frames: usize) -> Vec<Range<usize>> {
+    let count = (frames / WINDOW).clamp(1, CANDIDATES);
+    let length = WINDOW.min(frames);
+    let start = |k: usize| k * (frames - length) / (count - 1).max(1);
+    (0..count).map(|k| start(k)..start(k) + length).collect()
+}
+
+/// Median angle that the camera turns from frame to frame, radians.
+fn liveliness(tracked: &[Tracked]) -> f64 {
+    let turn = |pair: &[Tracked]| {
+        let motion = pair[0].world_from_mid.tangent_to(&pair[1].world_from_mid);
+        if pair[0].is_found && pair[1].is_found { motion.fixed_rows::<3>(3).norm() } else { 0.0 }
+    };
+    median(&tracked.windows(2).map(turn).collect::<Vec<_>>()).unwrap_or(0.0)
+}
+
+/// A stretch of the recording in memory.
+#[derive(Debug)]
+pub(super) struct Window<'a> {
+    pub(super) recording: Recording<'a>,
+    fine: Vec<RgbdFrame>,
+    coarse: Vec<RgbdFrame>,
+    length: usize,
+}
+
+impl<'a> Window<'a> {
+    fn read(recording: Recording<'a>, range: Range<usize>) -> Self {
+        let levels = [Resolution::Fine, Resolution::Coarse].map(|resolution| recording.level(resolution));
+        let length = range.len();
+        let fine = recording.read(range, levels[0]);
+        let coarse = fine.par_iter().map(|frame| reduced(frame.clone(), levels[1] - levels[0])).collect();
+        Self { recording, fine, coarse, length }
+    }
+
+    /// Whether it is the whole data set.
+    pub(super) fn is_whole(&self) -> bool {
+        self.length == self.recording.dataset.len()
+    }
+
+    /// The fine frame with this index of the data set; none if it is not in the window or was unreadable.
     pub(super) fn frame(&self, index: usize) -> Option<&RgbdFrame> {
-        let place = self.frames.binary_search_by_key(&index, |frame| frame.index).ok()?;
-        self.frames.get(place)
+        let place = self.fine.binary_search_by_key(&index, |frame| frame.index).ok()?;
+        self.fine.get(place)
+    }
+
+    /// The camera of the fine frames.
+    pub(super) fn camera(&self) -> PinholeCamera {
+        self.recording.dataset.calibration().camera.at_level(self.recording.level(Resolution::Fine))
     }
 
     /// Tracks the window with a supposed camera.
-    pub(super) fn track(&self, dataset: &Dataset, options: &TrackingOptions, guess: &Guess) -> Vec<Tracked> {
-        track(self.frames.iter(), &config(dataset, options, guess), guess)
+    pub(super) fn track(&self, resolution: Resolution, guess: &Guess) -> Vec<Tracked> {
+        let frames = match resolution {
+            Resolution::Fine => &self.fine,
+            Resolution::Coarse => &self.coarse,
+        };
+        self.recording.track(frames, self.recording.level(resolution), guess)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_long_recording_has_a_few_stretches_from_start_to_end() {
+        assert_eq!(stretches(40), [0..40]);
+        assert_eq!(stretches(100), [0..60]);
+        assert_eq!(stretches(130), [0..60, 70..130]);
+        assert_eq!(stretches(1060), [0..60, 250..310, 500..560, 750..810, 1000..1060]);
     }
 }

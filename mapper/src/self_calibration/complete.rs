@@ -7,7 +7,7 @@ use super::exposure::PixelScale;
 use super::exposure_times::{ExposureSearch, ExposureTimes, SHORTEST};
 use super::finding::{Finding, Value};
 use super::robust::median;
-use super::window::{Guess, Recording, Resolution, Tracked, Window};
+use super::window::{Guess, Probe, Recording, Resolution, Window};
 use crate::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
 use crate::tracking::TrackingOptions;
 
@@ -23,9 +23,6 @@ const SHORTEST_READOUT: f64 = 8e-3;
 
 /// Relative error of a readout from edges: of the polynomial between poses, and of depth's own edges.
 const READOUT_SYSTEMATIC: f64 = 0.05;
-
-/// Rounds of looking at edges.
-const EDGE_ROUNDS: usize = 2;
 
 /// Depth that lies further beside colour is worth telling: shares of the image's width, and how well that is known.
 const TELLING_SHIFT: f64 = 0.005;
@@ -96,47 +93,37 @@ impl Estimates {
         let options = TrackingOptions::default();
         let guess = Guess::of(dataset);
         let recording = Recording { dataset, options: &options };
-        let (window, tracked) = recording.liveliest(&guess);
-        let (guess, tracked) = found.look_at_edges(&window, guess, tracked);
-        if !exposure_known {
-            let scale = PixelScale::new(&calibration.camera, depth);
-            found.exposures = ExposureSearch { window: &window, scale }.find(guess, tracked);
+        let (window, mut probe) = recording.liveliest(guess);
+        probe = found.look_at_edges(&window, probe);
+        let search = ExposureSearch { window: &window, scale: PixelScale::new(&calibration.camera, depth) };
+        let settled = if exposure_known { None } else { search.coarse(probe.clone()) };
+        let exposures_are_told = settled.is_some();
+        // The second look knows the motion better.
+        probe = found.look_at_edges(&window, settled.unwrap_or(probe));
+        if exposures_are_told {
+            found.exposures = search.fine(probe.guess);
         }
         found
     }
 
-    /// What the edges of colour and depth tell, in two rounds: the second knows the motion better. Returns the guess with it,
-    /// and what tracking with that found.
-    fn look_at_edges(
-        &mut self,
-        window: &Window<'_>,
-        mut guess: Guess,
-        mut tracked: Vec<Tracked>,
-    ) -> (Guess, Vec<Tracked>) {
-        let calibration = window.recording.dataset.calibration();
-        let is_delay_known = calibration.sources.depth_delay != Knowledge::Assumed;
-        for _ in 0..EDGE_ROUNDS {
-            let Some(edges) = depth_time::find(window, &tracked) else { break };
-            self.depth_shift = Some(edges.shift);
-            let before = guess.clone();
-            if !is_delay_known && edges.delay.differs_from_none() {
-                self.depth_delay = Some(edges.delay);
-                guess.depth_delay = edges.delay.seconds;
-            }
-            let follow_each_other =
-                edges.rows.differs_from_none() && edges.rows.seconds.abs() > SHORTEST_READOUT;
-            if self.readout_was_sought && follow_each_other {
-                // The motion that the edges are moved by is as uncertain as that of exposures.
-                let sigma = edges.rows.sigma.hypot(READOUT_SYSTEMATIC * edges.rows.seconds);
-                self.readout = Some(Measured { sigma, ..edges.rows });
-                guess.readout = edges.rows.seconds;
-            }
-            if guess == before {
-                break;
-            }
-            tracked = window.track(Resolution::Coarse, &guess);
+    /// What the edges of colour and depth tell. Returns the probe with it, tracked again if it changed.
+    fn look_at_edges(&mut self, window: &Window<'_>, probe: Probe) -> Probe {
+        let sources = window.recording.dataset.calibration().sources;
+        let Some(edges) = depth_time::find(window, &probe.tracked) else { return probe };
+        self.depth_shift = Some(edges.shift);
+        let mut guess = probe.guess.clone();
+        if sources.depth_delay == Knowledge::Assumed && edges.delay.differs_from_none() {
+            self.depth_delay = Some(edges.delay);
+            guess.depth_delay = edges.delay.seconds;
         }
-        (guess, tracked)
+        let follow_each_other = edges.rows.differs_from_none() && edges.rows.seconds.abs() > SHORTEST_READOUT;
+        if self.readout_was_sought && follow_each_other {
+            // The motion that the edges are moved by is as uncertain as that of exposures.
+            let sigma = edges.rows.sigma.hypot(READOUT_SYSTEMATIC * edges.rows.seconds);
+            self.readout = Some(Measured { sigma, ..edges.rows });
+            guess.readout = edges.rows.seconds;
+        }
+        if guess == probe.guess { probe } else { window.probe(Resolution::Coarse, guess) }
     }
 
     fn apply(&self, dataset: Dataset) -> Result<Dataset, DatasetError> {

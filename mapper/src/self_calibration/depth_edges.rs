@@ -3,6 +3,8 @@
 //! Depth is measured at another time than colour, and rows of either may follow each other. Then an edge of depth lies
 //! beside that of colour by the motion in between, which shows when that was.
 
+use std::sync::Arc;
+
 use mba_tracker::geometry::PinholeCamera;
 use nalgebra::{Vector3, Vector6};
 
@@ -30,12 +32,12 @@ struct EdgePoint {
 }
 
 /// Jumps of depth in a frame and the strength of its picture's edges.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct EdgeFrame {
     width: usize,
     height: usize,
     /// Smoothed magnitude of the brightness gradient of every pixel.
-    gradient: Vec<f32>,
+    gradient: Arc<[f32]>,
     points: Vec<EdgePoint>,
     /// Timestamp of depth minus that of colour, seconds.
     stamp: f64,
@@ -87,7 +89,7 @@ impl EdgeFrame {
         Some(Self {
             width: image.width,
             height: image.height,
-            gradient: gradient(image),
+            gradient: gradient(image).into(),
             points: jumps(image).into_iter().map(point).collect(),
             stamp: image.depth_timestamp - image.timestamp,
         })

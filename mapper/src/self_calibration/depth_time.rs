@@ -11,11 +11,12 @@ use super::depth_edges::{EdgeFrame, Supposition};
 use super::window::{Tracked, Window};
 
 /// Jumps that are looked at, at the most, and how many there have to be.
-const MOST_JUMPS: usize = 20_000;
+const MOST_JUMPS: usize = 80_000;
 const FEWEST_JUMPS: usize = 400;
 
-/// Jumps with which the coarse search is content.
+/// Jumps with which the coarse search and the way from there are content.
 const COARSE_JUMPS: usize = 6_000;
+const FAR_JUMPS: usize = 20_000;
 
 /// Delays of the coarse search, seconds, and differences of rows' times from which the fine search sets out.
 const DELAYS: [f64; 17] = [
@@ -95,19 +96,22 @@ pub(super) fn find(window: &Window<'_>, tracked: &[Tracked]) -> Option<DepthTime
         return None;
     }
     let scale = window.camera().width as f64 / 640.0;
-    let edges = Edges { frames: thinned(frames, jumps.div_ceil(MOST_JUMPS)), scale };
-    let mut terrain = Terrain { origin: edges.coarse(), edges: &edges, known: HashMap::new() };
+    let some = Edges { frames: thinned(frames.clone(), jumps.div_ceil(FAR_JUMPS)), scale };
+    let mut terrain = Terrain::new(&some, some.coarse());
     let climbs = ROWS.map(|rows| {
         let start = [0, 0, 0, 0, (rows / STEPS[4]).round() as i32];
         terrain.climb(start, FAR, None)
     });
-    let (best, _) = climbs.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let (near, _) = climbs.into_iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let sigmas = terrain.spread_over_blocks(near);
+    let edges = Edges { frames: thinned(frames, jumps.div_ceil(MOST_JUMPS)), scale };
+    let mut terrain = Terrain::new(&edges, terrain.origin);
+    let (best, _) = terrain.climb(near, NEAR, None);
     let place = terrain.supposition(&best);
     if edges.contrast(&place) < MIN_CONTRAST {
         return None;
     }
     let (recorded, fine) = (window.recording.dataset.calibration().camera.width, window.camera().width);
-    let sigmas = terrain.spread_over_blocks(best);
     let of_edges = EDGE_SIGMA * edges.scale / edges.speed();
     // Rows lie within half of their whole time of the middle: evenly, their standard deviation is a part in sqrt(12).
     let of_rows = 12.0_f64.sqrt() * of_edges;
@@ -220,7 +224,11 @@ struct Terrain<'a> {
     known: HashMap<Place, [Strength; BLOCKS]>,
 }
 
-impl Terrain<'_> {
+impl<'a> Terrain<'a> {
+    fn new(edges: &'a Edges, origin: Supposition) -> Self {
+        Self { edges, origin, known: HashMap::new() }
+    }
+
     fn supposition(&self, place: &Place) -> Supposition {
         let step = |figure: usize| f64::from(place[figure]) * STEPS[figure];
         let (scale, origin) = (self.edges.scale, &self.origin);

@@ -2,7 +2,7 @@
 
 use super::brightness::relative_brightness;
 use super::exposure::{self, PixelScale};
-use super::window::{Guess, Resolution, Tracked, Window};
+use super::window::{Guess, Probe, Resolution, Tracked, Window};
 use crate::dataset::{Knowledge, LONGEST_ASSUMED_EXPOSURE};
 
 /// Brightness explains the exposure times unless one time for all fits the motion better than it by this factor.
@@ -11,13 +11,14 @@ const BRIGHTNESS_DOUBT: f64 = 1.25;
 /// Relative error of an exposure time that many frames share: of paths, and of the polynomial between poses.
 const SYSTEMATIC: f64 = 0.02;
 
-/// Relative change of the exposure time that is no more than noise; also one standard deviation of it is.
-const SETTLED: f64 = 0.02;
+/// Relative change of the exposure time that is no more than noise. What is left to go may be several times as much, as the path
+/// fills the time it is given.
+const SETTLED: f64 = 0.01;
 
 /// Rounds after which the exposure time agrees with the motion: of coarse pictures from any time on, and of fine ones from nearly
 /// the right one on.
 const COARSE_ROUNDS: usize = 4;
-const FINE_ROUNDS: usize = 2;
+const FINE_ROUNDS: usize = 3;
 
 /// Rounds after which the power of a response agrees with the motion, and the change that is no more than noise.
 const POWER_ROUNDS: usize = 2;
@@ -29,13 +30,6 @@ const SHORTENING: f64 = 2.5;
 
 /// Shortest exposure time of a guess, seconds.
 pub(super) const SHORTEST: f64 = 1e-4;
-
-/// What is supposed, and what tracking with it found.
-#[derive(Clone, Debug)]
-struct Probe {
-    guess: Guess,
-    tracked: Vec<Tracked>,
-}
 
 /// Exposure times of frames, seconds, and how certain they are.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,21 +47,22 @@ pub(super) struct ExposureSearch<'a> {
 }
 
 impl ExposureSearch<'_> {
-    /// Exposure times of all frames, from what tracking the window at coarse resolution with a guess found; none without
-    /// enough motion.
-    ///
-    /// Coarse pictures tell nearly all of it; a lens that is soft over a pixel or two makes the last few percent, for which
-    /// fine ones are tracked.
-    pub(super) fn find(&self, guess: Guess, tracked: Vec<Tracked>) -> Option<ExposureTimes> {
-        let mut start = Probe { guess, tracked };
+    /// Exposure times that agree with the motion of coarse pictures, from what tracking the window with a guess found; none
+    /// without enough motion.
+    pub(super) fn coarse(&self, mut start: Probe) -> Option<Probe> {
         if self.window.is_whole() {
             let exposures = follow_brightness(&start.tracked, &start.guess);
             if exposures != start.guess.exposures {
-                start = self.probe(Resolution::Coarse, Guess { exposures, ..start.guess });
+                start = self.window.probe(Resolution::Coarse, Guess { exposures, ..start.guess });
             }
         }
-        let settled = self.settle(Resolution::Coarse, start)?;
-        let (fine, power) = self.follow_response(self.probe(Resolution::Fine, settled.guess));
+        self.settle(Resolution::Coarse, start)
+    }
+
+    /// Exposure times of all frames from those that coarse pictures tell, which is nearly all of it: a lens that is soft over
+    /// a pixel or two makes the last few percent.
+    pub(super) fn fine(&self, guess: Guess) -> Option<ExposureTimes> {
+        let (fine, power) = self.follow_response(self.window.probe(Resolution::Fine, guess));
         let Probe { guess, tracked } = self.settle(Resolution::Fine, fine)?;
         let brightness = if self.window.is_whole() {
             follow_brightness(&tracked, &guess)
@@ -107,9 +102,12 @@ impl ExposureSearch<'_> {
             if (power - 1.0).abs() < SAME_POWER {
                 break;
             }
+            let Some(factor) = exposure::factor(&observed, &probe.guess.exposures) else { break };
             whole_power *= power;
             let exposures = raised(&probe.guess.exposures, power);
-            probe = self.probe(Resolution::Fine, Guess { exposures, ..probe.guess });
+            let exposures =
+                scaled(&Guess { exposures, ..probe.guess.clone() }, factor.median.max(0.5)).exposures;
+            probe = self.window.probe(Resolution::Fine, Guess { exposures, ..probe.guess });
         }
         (probe, whole_power)
     }
@@ -128,9 +126,8 @@ impl ExposureSearch<'_> {
         let mut last: Option<(f64, f64)> = None;
         for round in 0.. {
             let observed = exposure::observations(&probe.tracked, &self.scale, self.interval());
-            let found = exposure::factor(&observed, &probe.guess.exposures)?;
-            let step = found.median.max(0.05).ln();
-            if step.abs() < SETTLED.max(found.sigma / found.median) || round == rounds {
+            let step = exposure::factor(&observed, &probe.guess.exposures)?.median.max(0.05).ln();
+            if step.abs() < SETTLED || round == rounds {
                 break;
             }
             // Secant on the logarithm: how much of a step the motion took back the last time.
@@ -145,13 +142,9 @@ impl ExposureSearch<'_> {
             if guess == probe.guess {
                 break;
             }
-            probe = self.probe(resolution, guess);
+            probe = self.window.probe(resolution, guess);
         }
         Some(probe)
-    }
-
-    fn probe(&self, resolution: Resolution, guess: Guess) -> Probe {
-        Probe { tracked: self.window.track(resolution, &guess), guess }
     }
 
     /// Seconds between frames.

@@ -38,6 +38,13 @@ impl Guess {
     }
 }
 
+/// What is supposed, and what tracking a window with it found.
+#[derive(Clone, Debug)]
+pub(super) struct Probe {
+    pub(super) guess: Guess,
+    pub(super) tracked: Vec<Tracked>,
+}
+
 /// What tracking found out about one frame.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Tracked {
@@ -144,20 +151,20 @@ impl<'a> Recording<'a> {
     }
 
     /// The stretch of the recording that turns most, tracked at coarse resolution.
-    pub(super) fn liveliest(&self, guess: &Guess) -> (Window<'a>, Vec<Tracked>) {
+    pub(super) fn liveliest(&self, guess: Guess) -> (Window<'a>, Probe) {
         let stretches = stretches(self.dataset.len());
         if let [whole] = &stretches[..] {
             let window = Window::read(*self, whole.clone());
-            let tracked = window.track(Resolution::Coarse, guess);
-            return (window, tracked);
+            let probe = window.probe(Resolution::Coarse, guess);
+            return (window, probe);
         }
         let level = self.level(Resolution::Coarse);
-        let try_one =
-            |range: Range<usize>| (self.track(&self.read(range.clone(), level), level, guess), range);
-        let tracked: Vec<(Vec<Tracked>, Range<usize>)> = stretches.into_iter().map(try_one).collect();
+        let track =
+            |range: Range<usize>| (self.track(&self.read(range.clone(), level), level, &guess), range);
+        let tracked: Vec<(Vec<Tracked>, Range<usize>)> = stretches.into_iter().map(track).collect();
         let best = tracked.into_iter().max_by(|a, b| liveliness(&a.0).total_cmp(&liveliness(&b.0)));
         let (tracked, range) = best.unwrap_or_default();
-        (Window::read(*self, range), tracked)
+        (Window::read(*self, range), Probe { guess, tracked })
     }
 
     /// How often the resolution is halved.
@@ -231,12 +238,12 @@ impl<'a> Window<'a> {
     }
 
     /// Tracks the window with a supposed camera.
-    pub(super) fn track(&self, resolution: Resolution, guess: &Guess) -> Vec<Tracked> {
+    pub(super) fn probe(&self, resolution: Resolution, guess: Guess) -> Probe {
         let frames = match resolution {
             Resolution::Fine => &self.fine,
             Resolution::Coarse => &self.coarse,
         };
-        self.recording.track(frames, self.recording.level(resolution), guess)
+        Probe { tracked: self.recording.track(frames, self.recording.level(resolution), &guess), guess }
     }
 }
 

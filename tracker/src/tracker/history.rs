@@ -38,6 +38,15 @@ const BOW_FLOOR: f64 = 4.0;
 const MAX_ACCELERATION: f64 = 100.0;
 const MAX_ANGULAR_ACCELERATION: f64 = 500.0;
 
+/// Speeds beyond which a hand-held or flying camera's pose is a mistake, m/s and rad/s.
+const MAX_SPEED: f64 = 8.0;
+const MAX_ANGULAR_SPEED: f64 = 15.0;
+
+/// Change of the pose against steady motion beyond which it is a mistake: a change by so many times the acceleration of a
+/// violently shaken hand, and what poses are wrong by, metres and radians, which counts where frames follow fast.
+const ACCELERATION_MARGINS: [f64; 2] = [2.0, 1.0];
+const POSE_ERROR: f64 = 0.03;
+
 /// Standard deviations of a gyroscope's rate: what is left of its bias and noise, rad/s, and a share of the rate for its
 /// scale and its time.
 const GYRO_SIGMA: f64 = 0.05;
@@ -73,6 +82,26 @@ impl Motion {
             acceleration: rotated(other_from_reference, &self.acceleration),
             ..*self
         }
+    }
+
+    /// Whether a hand can have brought the camera to this pose at `timestamp`: neither speed nor acceleration are impossible.
+    pub(super) fn can_reach(&self, reference_from_mid: &RigidTransform, timestamp: f64) -> bool {
+        let dt = timestamp - self.timestamp;
+        let rate = self.reference_from_mid.tangent_to(reference_from_mid) / dt;
+        let length = |motion: &Vector6<f64>, group: usize| motion.fixed_rows::<3>(group).norm();
+        let is_slow = length(&rate, 0) < MAX_SPEED && length(&rate, 3) < MAX_ANGULAR_SPEED;
+        if dt > MAX_GAP || self.interval > MAX_GAP {
+            return is_slow;
+        }
+        // Velocities are means over the intervals before and after the last frame, whose middles are that far apart.
+        let between_middles = 0.5 * (dt + self.interval);
+        let change = (rate - self.between_frames) * dt;
+        let limits = [MAX_ACCELERATION, MAX_ANGULAR_ACCELERATION];
+        let is_steady = (0..2).all(|kind| {
+            let possible = ACCELERATION_MARGINS[kind] * limits[kind] * between_middles * dt;
+            length(&change, 3 * kind) < possible + POSE_ERROR
+        });
+        is_slow && is_steady
     }
 
     /// Pose after `dt` seconds at `rate`.

@@ -16,10 +16,8 @@ pub(super) struct Evidence {
     pub(super) blur: f32,
     /// Share of the image with measured depth.
     pub(super) depth_share: f32,
-    /// Speed since the last frame, m/s.
-    pub(super) speed: f64,
-    /// Angular speed since the last frame, rad/s.
-    pub(super) angular_speed: f64,
+    /// Whether a hand can have moved the camera there.
+    pub(super) is_reachable: bool,
 }
 
 /// Running means of what good frames end with.
@@ -47,10 +45,6 @@ impl Typical {
 /// how well others can fit.
 const COPY: f32 = 0.06;
 
-/// Speeds beyond which a hand-held or flying camera's pose is a mistake.
-const MAX_SPEED: f64 = 8.0;
-const MAX_ANGULAR_SPEED: f64 = 15.0;
-
 /// Bounds of the brightness relative to the reference: what exposure control changes while a keyframe is in view, with a
 /// factor of two to spare.
 const GAIN_RANGE: core::ops::Range<f32> = 0.12..8.0;
@@ -77,7 +71,7 @@ pub(super) fn judge(
     if !(aligned && measured) {
         return lost(Doubt::NoMatch);
     }
-    if !(evidence.speed < MAX_SPEED && evidence.angular_speed < MAX_ANGULAR_SPEED) {
+    if !evidence.is_reachable {
         return lost(Doubt::Speed);
     }
     if !GAIN_RANGE.contains(&outcome.estimate.brightness.gain) {

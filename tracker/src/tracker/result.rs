@@ -40,7 +40,7 @@ pub enum Doubt {
     NoStart,
     /// Nothing of the reference was found.
     NoMatch,
-    /// The camera would have moved faster than any hand.
+    /// The camera would have moved faster than any hand, or more jerkily.
     Speed,
     /// The brightness would have changed more than any exposure control changes it.
     Brightness,

@@ -267,12 +267,15 @@ impl<'m> Tracker<'m> {
             (aligned, revision) = self.bootstrap(frame, motion);
         } else {
             aligned = self.align(frame, motion, self.config.align.blur, None);
-            if fits_badly(&aligned.outcome, &self.typical) {
+            let is_reachable = self.is_reachable(&aligned.outcome, motion, frame);
+            if !is_reachable || fits_badly(&aligned.outcome, &self.typical) {
                 // As if nothing were known about the motion: all directions are tried.
                 let anywhere = Motion { within_exposure: None, ..*motion };
                 let other = self.align(frame, &anywhere, self.config.align.blur, None);
                 let keypoints = self.keyframe.finest_keypoints().len();
-                if score(&other.outcome, keypoints) < score(&aligned.outcome, keypoints) {
+                let fits_better = score(&other.outcome, keypoints) < score(&aligned.outcome, keypoints);
+                let other_is_reachable = self.is_reachable(&other.outcome, motion, frame);
+                if other_is_reachable && (fits_better || !is_reachable) {
                     aligned = other;
                 }
             }
@@ -384,21 +387,24 @@ impl<'m> Tracker<'m> {
         judge(outcome, &self.evidence(outcome, motion, frame), &self.typical)
     }
 
+    /// Whether a hand can have moved the camera where an alignment ended.
+    fn is_reachable(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> bool {
+        let mid = outcome.estimate.keyframe_from_camera.mid();
+        motion.can_reach(&self.keyframe.world_from_keyframe.compose(&mid), frame.timestamp)
+    }
+
     fn evidence(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> Evidence {
         let keypoints = self.keyframe.finest_keypoints();
         let total = keypoints.len().max(1) as f32;
         let mid = outcome.estimate.keyframe_from_camera.mid();
         let path = ExposureTrajectory { start: RigidTransform::identity(), end: mid };
-        let rate = motion.reference_from_mid.tangent_to(&self.keyframe.world_from_keyframe.compose(&mid))
-            / (frame.timestamp - motion.timestamp);
         Evidence {
             overlap: outcome.patches_in_view as f32 / total,
             inliers: outcome.patches as f32 / total,
             flow: self.blur_length(&path),
             blur: self.blur_length(&exposure_of(&outcome.estimate.path(), &self.timing)),
             depth_share: self.depth_share,
-            speed: rate.fixed_rows::<3>(0).norm(),
-            angular_speed: rate.fixed_rows::<3>(3).norm(),
+            is_reachable: self.is_reachable(outcome, motion, frame),
         }
     }
 

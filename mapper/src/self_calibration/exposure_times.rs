@@ -17,7 +17,7 @@ const SETTLED: f64 = 0.01;
 
 /// Rounds after which the exposure time agrees with the motion: of coarse pictures from any time on, and of fine ones from nearly
 /// the right one on.
-const COARSE_ROUNDS: usize = 4;
+const COARSE_ROUNDS: usize = 1;
 const FINE_ROUNDS: usize = 3;
 
 /// Rounds after which the power of a response agrees with the motion, and the change that is no more than noise.

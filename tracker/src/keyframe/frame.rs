@@ -2,6 +2,7 @@
 
 use arrayvec::ArrayVec;
 
+use super::rolling_fusion::fuse_rolling_depth;
 use super::select::{Keypoint, SelectionSettings, select_keypoints};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
@@ -125,15 +126,23 @@ impl<'m> Keyframe<'m> {
         self.planes.fit(&self.depth);
     }
 
-    /// Averages in the depth map of a frame at `keyframe_from_camera`; `camera` is that of the depth maps. Planes
-    /// and keypoint depths follow whenever the number of frames has doubled, from two on.
+    /// Averages in the depth map of a frame that moved along `keyframe_from_camera` and whose depth was measured at the times
+    /// of `timing`; `camera` is that of the depth maps. Planes and keypoint depths follow whenever the number of frames
+    /// has doubled, from two on.
     pub fn fuse_depth(
         &mut self,
         current: &InverseDepthMap,
-        keyframe_from_camera: &RigidTransform,
+        keyframe_from_camera: &BowedTrajectory,
+        timing: &FrameTiming,
         camera: &PinholeCamera,
     ) {
-        fuse_depth(&mut self.depth, self.weights, current, keyframe_from_camera, camera);
+        if timing.depth_readout == 0.0 {
+            let keyframe_from_depth = keyframe_from_camera.at(0.5 + timing.depth_time);
+            fuse_depth(&mut self.depth, self.weights, current, &keyframe_from_depth, camera);
+        } else {
+            let (depth, weights) = (&mut self.depth, &mut *self.weights);
+            fuse_rolling_depth(depth, weights, current, keyframe_from_camera, timing, camera);
+        }
         self.fusions += 1;
         if self.fusions > 1 && self.fusions.is_power_of_two() {
             self.planes.fit(&self.depth);

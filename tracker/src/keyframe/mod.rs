@@ -2,6 +2,8 @@
 
 mod frame;
 mod rectify;
+mod rolling_fusion;
+mod row_views;
 mod select;
 
 pub use frame::{Keyframe, MAX_KEYPOINTS, max_keypoints};

@@ -46,15 +46,28 @@ pub fn fuse_depth(
             let seen = current.sample(fx * point.x * inverse_z + cx, fy * point.y * inverse_z + cy);
             let Some(measured) = seen else { continue };
             let expected = rho * inverse_z;
-            let difference = measured - expected;
-            if difference.abs() < spread_limit(expected) {
-                // Along the keyframe's ray z_current = ray.z / rho + translation.z.
-                let corrected = ray.z * measured / (1.0 - translation.z * measured).max(0.1);
-                let weight = weights[index];
-                keyframe.values[index] = rho + (corrected - rho) / (weight + 1.0);
-                weights[index] = (weight + 1.0).min(MAX_WEIGHT);
-            }
+            let (value, weight) = (&mut keyframe.values[index], &mut weights[index]);
+            fuse_measurement(value, weight, measured, expected, [ray.z, translation.z]);
         }
+    }
+}
+
+/// Fuses one measurement of the current frame's inverse depth into `value`, that of a keyframe's pixel behind which there are
+/// `weight` measurements, if it is near the one that is `expected` there. A point on the pixel's ray at the depth `z` lies at
+/// `ray_z * z + shift_z` in the current camera.
+#[inline]
+pub fn fuse_measurement(
+    value: &mut f32,
+    weight: &mut f32,
+    measured: f32,
+    expected: f32,
+    [ray_z, shift_z]: [f32; 2],
+) {
+    let difference = measured - expected;
+    if difference.abs() < spread_limit(expected) {
+        let corrected = ray_z * measured / (1.0 - shift_z * measured).max(0.1);
+        *value += (corrected - *value) / (*weight + 1.0);
+        *weight = (*weight + 1.0).min(MAX_WEIGHT);
     }
 }
 

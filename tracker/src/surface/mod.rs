@@ -9,5 +9,5 @@ mod fusion;
 mod planes;
 
 pub use block_mean::{InverseDepthMap, spread_limit};
-pub use fusion::fuse_depth;
+pub use fusion::{fuse_depth, fuse_measurement};
 pub use planes::SurfacePlanes;

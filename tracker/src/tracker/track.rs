@@ -463,11 +463,7 @@ impl<'m> Tracker<'m> {
             self.correct_keyframe_path(&correction);
         } else if status == FrameStatus::Ok {
             let camera = self.config.camera.at_level(self.config.surface_level);
-            // Rows of depth at different times would have to be fused one by one.
-            if self.timing.depth_readout == 0.0 {
-                let keyframe_from_depth = outcome.estimate.path().at(0.5 + self.timing.depth_time);
-                self.keyframe.fuse_depth(&self.depth, &keyframe_from_depth, &camera);
-            }
+            self.keyframe.fuse_depth(&self.depth, &outcome.estimate.path(), &self.timing, &camera);
         }
         result
     }

@@ -6,6 +6,7 @@ use super::depth_time::{self, Measured};
 use super::exposure::PixelScale;
 use super::exposure_times::{ExposureSearch, ExposureTimes, SHORTEST};
 use super::finding::{Finding, Value};
+use super::readout::{ReadoutSearch, depth_readout};
 use super::robust::median;
 use super::window::{Guess, Probe, Recording, Resolution, Window};
 use crate::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
@@ -67,8 +68,12 @@ struct Estimates {
     /// None without motion.
     exposures: Option<ExposureTimes>,
     readout: Option<Measured>,
+    /// Time from the first row of depth to the last, seconds; none where it is on record or nothing tells.
+    depth_readout: Option<f64>,
     /// Seconds by which depth is later than its timestamps.
     depth_delay: Option<Measured>,
+    /// What the rows of colour take longer than those of depth.
+    longer_than_depth: Option<Measured>,
     /// Pixels that depth lies beside colour; none where the picture does not tell.
     depth_shift: Option<[f64; 2]>,
     /// Whether the frames say anything about the readout.
@@ -82,7 +87,9 @@ impl Estimates {
         let mut found = Self {
             exposures: None,
             readout: None,
+            depth_readout: None,
             depth_delay: None,
+            longer_than_depth: None,
             depth_shift: None,
             readout_was_sought: !readout_known,
         };
@@ -95,7 +102,11 @@ impl Estimates {
         let recording = Recording { dataset, options: &options };
         let (window, mut probe) = recording.liveliest(guess);
         probe = found.look_at_edges(&window, probe);
-        let search = ExposureSearch { window: &window, scale: PixelScale::new(&calibration.camera, depth) };
+        let scale = PixelScale::new(&calibration.camera, depth);
+        if !readout_known && found.readout.is_none() {
+            probe = found.find_readout(&window, scale, probe);
+        }
+        let search = ExposureSearch { window: &window, scale };
         let settled = if exposure_known { None } else { search.coarse(probe.clone()) };
         let exposures_are_told = settled.is_some();
         // The second look knows the motion better.
@@ -111,6 +122,7 @@ impl Estimates {
         let sources = window.recording.dataset.calibration().sources;
         let Some(edges) = depth_time::find(window, &probe.tracked) else { return probe };
         self.depth_shift = Some(edges.shift);
+        self.longer_than_depth = Some(edges.rows);
         let mut guess = probe.guess.clone();
         if sources.depth_delay == Knowledge::Assumed && edges.delay.differs_from_none() {
             self.depth_delay = Some(edges.delay);
@@ -126,12 +138,32 @@ impl Estimates {
         if guess == probe.guess { probe } else { window.probe(Resolution::Coarse, guess) }
     }
 
+    /// The readout that motion tells where the edges do not. Returns the probe with it, tracked again if it changed.
+    fn find_readout(&mut self, window: &Window<'_>, scale: PixelScale, probe: Probe) -> Probe {
+        let calibration = window.recording.dataset.calibration();
+        let depth_is_known = calibration.sources.depth_delay != Knowledge::Assumed;
+        // What edges do not tell for certain is taken for none: both sensors roll, or neither.
+        let longer = self.longer_than_depth.filter(|_| !depth_is_known);
+        let longer_than_depth = longer.map(|rows| if rows.is_certain() { rows.seconds } else { 0.0 });
+        let is_rolling = matches!(calibration.readout, Readout::Rolling { .. });
+        let search = ReadoutSearch { window, scale, guess: &probe.guess, longer_than_depth, is_rolling };
+        let Some(found) = search.find() else { return probe };
+        self.readout = Some(found);
+        self.depth_readout = longer_than_depth.map(|longer| depth_readout(found.seconds, longer));
+        let depth_readout = self.depth_readout.unwrap_or(probe.guess.depth_readout);
+        window.probe(Resolution::Coarse, Guess { readout: found.seconds, depth_readout, ..probe.guess })
+    }
+
     fn apply(&self, dataset: Dataset) -> Result<Dataset, DatasetError> {
         let mut calibration = dataset.calibration().clone();
         let exposure_known = is_exposure_known(&calibration);
         if let Some(found) = self.readout {
             calibration.readout = Readout::Rolling { seconds: Some(found.seconds) };
             calibration.sources.readout = Knowledge::Estimated;
+        }
+        if let Some(seconds) = self.depth_readout {
+            calibration.depth_readout_seconds = seconds;
+            calibration.sources.depth_delay = Knowledge::Estimated;
         }
         if let Some(found) = self.depth_delay {
             calibration.depth_clock_seconds = found.seconds;
@@ -197,7 +229,9 @@ impl Estimates {
             fact: "readout",
             knowledge: Knowledge::Estimated,
             value: Some(Value { value: found.seconds, sigma: found.sigma, printed: MILLISECONDS }),
-            note: String::new(),
+            note: self.depth_readout.map_or_else(String::new, |seconds| {
+                format!("{:.1} ms of depth, as its jumps lie on the edges of colour", 1e3 * seconds)
+            }),
         }
     }
 

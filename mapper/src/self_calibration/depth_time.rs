@@ -48,7 +48,7 @@ const BLOCKS: usize = 5;
 
 /// A time is told from none when it is longer than this, seconds, and than so many standard deviations. Polynomials between
 /// poses are off by a twentieth of the times.
-const LEAST_TIME: f64 = 2e-3;
+const LEAST_TIME: f64 = 4e-3;
 const MIN_CERTAINTY: f64 = 3.0;
 
 /// A time is known when its standard deviation is less, seconds: a fifth of usual ones.

@@ -20,6 +20,8 @@ pub(super) struct Guess {
     pub(super) exposures: Vec<f64>,
     /// Time from the first row of colour to the last, seconds.
     pub(super) readout: f64,
+    /// The same of depth.
+    pub(super) depth_readout: f64,
     /// Added to the timestamps of depth, seconds.
     pub(super) depth_delay: f64,
     /// Factor on the focal lengths on record.
@@ -32,6 +34,7 @@ impl Guess {
         Self {
             exposures: (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect(),
             readout: dataset.calibration().readout.readout_seconds().unwrap_or(0.0),
+            depth_readout: dataset.calibration().depth_readout_seconds,
             depth_delay: 0.0,
             focal_scale: 1.0,
         }
@@ -179,6 +182,7 @@ impl<'a> Recording<'a> {
     fn config(&self, level: usize, guess: &Guess) -> TrackerConfig {
         let mut config = reduced_tracker_config(self.dataset, self.options, level);
         config.readout.colour = guess.readout;
+        config.readout.depth = guess.depth_readout;
         config.readout.depth_apart |= guess.depth_delay != 0.0;
         config.camera.fx *= guess.focal_scale;
         config.camera.fy *= guess.focal_scale;

@@ -1,0 +1,128 @@
+//! Readout time from motion: what moves while the rows are read, over the velocity that the poses of the frames give.
+//!
+//! A path that is sampled by rows tells how much the camera moved from the first row to the last. If the rows are supposed to
+//! take too short a time, that is more than the velocity allows, and less if they are supposed to take too long. Where both
+//! agree the time is right. Exposures are supposed to be short meanwhile: blur does not move the picture.
+
+use rayon::prelude::*;
+
+use super::depth_time::Measured;
+use super::exposure::{self, PixelScale};
+use super::exposure_times::SHORTEST;
+use super::robust::Spread;
+use super::window::{Guess, Resolution, Window};
+
+/// Readouts that are tried, as shares of the time between frames, which is the longest that there can be.
+const SHARES: [f64; 3] = [0.3, 0.6, 0.95];
+
+/// Standard deviations by which rows have to move more than the shortest share allows: where somebody says that they follow each
+/// other, and where nobody does. In the former case it is enough that they move more at all if their direction is told.
+const MIN_CERTAINTY: f64 = 2.0;
+const MIN_CERTAINTY_UNTOLD: f64 = 3.0;
+
+/// Standard deviations by which the other direction of the rows has to be worse, or better.
+const MIN_DIFFERENCE: f64 = 3.0;
+
+/// Relative error of a readout: of paths, and of the polynomial between poses. More where the time between frames bounds it.
+const SYSTEMATIC: f64 = 0.05;
+const BOUNDED: f64 = 0.1;
+
+/// What is looked at.
+pub(super) struct ReadoutSearch<'a> {
+    pub(super) window: &'a Window<'a>,
+    pub(super) scale: PixelScale,
+    /// Everything but the readouts.
+    pub(super) guess: &'a Guess,
+    /// What the rows of colour take longer than those of depth, seconds, if depth has rows.
+    pub(super) longer_than_depth: Option<f64>,
+    /// Whether it is known that the rows follow each other.
+    pub(super) is_rolling: bool,
+}
+
+impl ReadoutSearch<'_> {
+    /// The readout with which rows and poses agree; none where they agree with a global shutter, or with anything.
+    pub(super) fn find(&self) -> Option<Measured> {
+        let interval = 1.0 / self.window.recording.dataset.calibration().frame_rate;
+        let ends = [interval, -interval].map(|longest| SHARES[0] * longest);
+        let factors: Vec<Option<Spread>> = ends.into_par_iter().map(|readout| self.factor(readout)).collect();
+        let (down, up) = (factors[0]?, factors[1]?);
+        let difference = (down.median - up.median) / down.sigma.hypot(up.sigma).max(f64::MIN_POSITIVE);
+        let (first, sign) = if difference < -MIN_DIFFERENCE { (up, -1.0) } else { (down, 1.0) };
+        let excess = (first.median - 1.0) / first.sigma.max(f64::MIN_POSITIVE);
+        let has_direction = difference.abs() > MIN_DIFFERENCE;
+        let is_told = match self.is_rolling {
+            true => excess > MIN_CERTAINTY || (excess > 0.0 && has_direction),
+            false => excess > MIN_CERTAINTY_UNTOLD && has_direction,
+        };
+        if !is_told {
+            return None;
+        }
+        let longer: Vec<Option<Spread>> =
+            SHARES[1..].par_iter().map(|share| self.factor(sign * share * interval)).collect();
+        let factors = [Some(first), longer[0], longer[1]];
+        let shares = crossing(&factors)?;
+        Some(Measured { seconds: sign * shares.seconds * interval, sigma: shares.sigma * interval })
+    }
+
+    /// Motion within the rows over that which the poses give, when rows take `readout` seconds.
+    fn factor(&self, readout: f64) -> Option<Spread> {
+        let depth_readout =
+            self.longer_than_depth.map_or(self.guess.depth_readout, |longer| depth_readout(readout, longer));
+        let exposures = vec![SHORTEST; self.guess.exposures.len()];
+        let guess = Guess { readout, depth_readout, exposures, ..self.guess.clone() };
+        let probe = self.window.probe(Resolution::Fine, guess);
+        let interval = 1.0 / self.window.recording.dataset.calibration().frame_rate;
+        let observed = exposure::observations(&probe.tracked, &self.scale, interval);
+        exposure::factor(&observed, &probe.guess.exposures)
+    }
+}
+
+/// Time of the rows of depth when those of colour take `readout` and `longer` more than it; none of the other direction.
+pub(super) fn depth_readout(readout: f64, longer: f64) -> f64 {
+    let depth = readout - longer;
+    if depth * readout > 0.0 { depth } else { 0.0 }
+}
+
+/// Share of the time between frames at which the factors of [`SHARES`] fall below 1, with its standard deviation, or the last
+/// one.
+fn crossing(factors: &[Option<Spread>; SHARES.len()]) -> Option<Measured> {
+    let last = SHARES[SHARES.len() - 1];
+    for k in 1..SHARES.len() {
+        let (before, after) = (factors[k - 1]?, factors[k]?);
+        if after.median < 1.0 {
+            let slope = (before.median - after.median) / (SHARES[k] - SHARES[k - 1]);
+            let share = SHARES[k - 1] + (before.median - 1.0) / slope;
+            let sigma = (before.sigma.max(after.sigma) / slope).hypot(SYSTEMATIC * share);
+            return Some(Measured { seconds: share, sigma });
+        }
+    }
+    Some(Measured { seconds: last, sigma: BOUNDED * last })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn factors(values: [f64; 3]) -> [Option<Spread>; 3] {
+        values.map(|median| Some(Spread { median, sigma: 0.03 }))
+    }
+
+    #[test]
+    fn the_readout_is_where_rows_and_poses_agree() {
+        let found = crossing(&factors([1.3, 1.1, 0.9])).unwrap();
+        assert!((found.seconds - 0.775).abs() < 1e-12, "{found:?}");
+        // 0.03 over a slope of 0.2 in 0.35, and a twentieth.
+        assert!((found.sigma - 0.0525_f64.hypot(0.05 * 0.775)).abs() < 1e-12, "{found:?}");
+        let found = crossing(&factors([1.3, 0.9, 0.7])).unwrap();
+        assert!((found.seconds - 0.525).abs() < 1e-12, "{found:?}");
+        assert_eq!(crossing(&factors([1.5, 1.3, 1.1])).unwrap().seconds, 0.95);
+        assert_eq!(crossing(&[None; 3]), None);
+    }
+
+    #[test]
+    fn depth_has_rows_of_the_same_direction_or_none() {
+        assert!((depth_readout(0.026, -0.004) - 0.03).abs() < 1e-15);
+        assert!((depth_readout(-0.02, -0.004) + 0.016).abs() < 1e-15);
+        assert_eq!(depth_readout(0.02, 0.021), 0.0);
+    }
+}

@@ -166,6 +166,11 @@ fn gyroscope_keeps_a_sudden_turn() {
         // The first frame of the turn is 40 px away from where a camera at rest would be.
         assert_ne!(result.status, FrameStatus::Lost, "frame {k}");
         assert!(metres < 0.005 && radians < 0.002, "frame {k}: {metres} m, {radians} rad");
-        assert!(metres <= metres_without + 1e-4, "frame {k}: {metres} m, without {metres_without} m");
+        // A lost frame holds its pose, which a camera that only turns does not leave.
+        let is_lost = without[k].status == FrameStatus::Lost;
+        assert!(
+            is_lost || metres <= metres_without + 1e-4,
+            "frame {k}: {metres} m, without {metres_without} m"
+        );
     }
 }

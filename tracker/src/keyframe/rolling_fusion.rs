@@ -48,3 +48,61 @@ pub(super) fn fuse_rolling_depth(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use nalgebra::{Vector3, Vector6};
+
+    use super::*;
+    use crate::geometry::RigidTransform;
+    use crate::trajectory::ExposureTrajectory;
+
+    const CAMERA: PinholeCamera =
+        PinholeCamera { width: 64, height: 48, fx: 60.0, fy: 60.0, cx: 31.5, cy: 23.5 };
+
+    /// A camera that turns and moves by several pixels from the first row to the last.
+    fn path() -> BowedTrajectory {
+        let motion = Vector6::new(0.06, -0.04, 0.1, 0.03, -0.08, 0.05);
+        let mid = RigidTransform::identity().perturbed(&Vector6::new(0.1, -0.05, 0.2, 0.02, -0.03, 0.05));
+        BowedTrajectory::without_bow(ExposureTrajectory::from_mid_and_motion(&mid, &motion))
+    }
+
+    /// Inverse depth of the plane `n x = 1` in row `k / 64` of a camera at the pose of its time.
+    fn plane_view(pose_of_row: impl Fn(usize) -> RigidTransform) -> Vec<f32> {
+        let n = Vector3::new(0.05, -0.03, 0.5);
+        let value = |k: usize| {
+            let pose = pose_of_row(k / 64);
+            let ray = pose.rotation * CAMERA.ray((k % 64) as f64, (k / 64) as f64);
+            (n.dot(&ray) / (1.0 - n.dot(&pose.translation))) as f32
+        };
+        (0..64 * 48).map(value).collect()
+    }
+
+    #[test]
+    fn rows_of_different_times_fuse_into_an_exact_surface() {
+        let (path, timing) =
+            (path(), FrameTiming { depth_time: 0.1, depth_readout: 0.8, ..FrameTiming::GLOBAL });
+        let truth = plane_view(|_| RigidTransform::identity());
+        let mut keyframe: Vec<f32> = truth.iter().map(|rho| rho + 0.001).collect();
+        let mut weights = vec![1.0; 64 * 48];
+        let mut current = plane_view(|v| path.at(timing.depth_row_time(v as f64, 48)));
+        let map = |values| InverseDepthMap { values, width: 64, height: 48, level: 0 };
+        fuse_rolling_depth(
+            &mut map(&mut keyframe),
+            &mut weights,
+            &map(&mut current),
+            &path,
+            &timing,
+            &CAMERA,
+        );
+        let fused: Vec<usize> = (0..64 * 48).filter(|&k| weights[k] == 2.0).collect();
+        assert!(fused.len() > 2000, "only {} pixels overlap", fused.len());
+        for k in fused {
+            let error = keyframe[k] - truth[k];
+            assert!((error - 0.0005).abs() < 4e-5, "half of the first error remains, not {error}");
+        }
+    }
+}

@@ -253,6 +253,27 @@ mod tests {
     }
 
     #[test]
+    fn no_hand_jumps_or_turns_round_within_a_frame() {
+        let dt = 1.0 / 30.0;
+        let steady = Vector6::new(1.0, 0.0, 0.0, 0.0, 0.5, 0.0);
+        let motion =
+            Motion { between_frames: steady, interval: dt, ..Motion::still(1.0, RigidTransform::identity()) };
+        let reaches = |motion: &Motion, change: [f64; 2], dt: f64| {
+            let moved = steady * dt + Vector6::new(0.0, change[0], 0.0, change[1], 0.0, 0.0);
+            motion.can_reach(&RigidTransform::identity().perturbed(&moved), 1.0 + dt)
+        };
+        // 200 m/s^2 and 500 rad/s^2 for a thirtieth of a second and as long before: 0.22 m, 0.56 rad, and 0.03 of error.
+        assert!(reaches(&motion, [0.24, 0.0], dt) && reaches(&motion, [0.0, 0.4], dt));
+        assert!(!reaches(&motion, [0.26, 0.0], dt) && !reaches(&motion, [-0.26, 0.0], dt));
+        // Faster than 8 m/s and 15 rad/s are out of reach whatever was before.
+        assert!(!reaches(&motion, [0.0, 0.51], dt));
+        let unknown = Motion::still(1.0, RigidTransform::identity());
+        assert!(reaches(&unknown, [0.26, 0.0], dt) && !reaches(&unknown, [0.28, 0.0], dt));
+        assert!(reaches(&motion, [7.0, 0.0], 1.0), "long ago");
+        assert!(!reaches(&motion, [9.0, 0.0], 1.0));
+    }
+
+    #[test]
     fn constant_acceleration_is_predicted_exactly() {
         let prior = motion(0.2).expected_motion(&pose(0.2 + DT), 0.2 + DT, 0.015, &CAMERA, 0.5);
         let error = prior.expected - quadratic(0.2 + DT).1 * 0.015;

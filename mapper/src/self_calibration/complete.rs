@@ -119,12 +119,12 @@ impl Estimates {
 
     /// What the edges of colour and depth tell. Returns the probe with it, tracked again if it changed.
     fn look_at_edges(&mut self, window: &Window<'_>, probe: Probe) -> Probe {
-        let sources = window.recording.dataset.calibration().sources;
+        let calibration = window.recording.dataset.calibration();
         let Some(edges) = depth_time::find(window, &probe.tracked) else { return probe };
         self.depth_shift = Some(edges.shift);
         self.longer_than_depth = Some(edges.rows);
         let mut guess = probe.guess.clone();
-        if sources.depth_delay == Knowledge::Assumed && edges.delay.differs_from_none() {
+        if calibration.sources.depth_delay == Knowledge::Assumed && edges.delay.differs_from_none() {
             self.depth_delay = Some(edges.delay);
             guess.depth_delay = edges.delay.seconds;
         }
@@ -132,8 +132,11 @@ impl Estimates {
         if self.readout_was_sought && follow_each_other {
             // The motion that the edges are moved by is as uncertain as that of exposures.
             let sigma = edges.rows.sigma.hypot(READOUT_SYSTEMATIC * edges.rows.seconds);
-            self.readout = Some(Measured { sigma, ..edges.rows });
-            guess.readout = edges.rows.seconds;
+            // Rows of depth are those on record, else none: the difference tells them from those of colour.
+            guess.depth_readout = calibration.depth_readout_seconds;
+            guess.readout = edges.rows.seconds + guess.depth_readout;
+            self.readout = Some(Measured { seconds: guess.readout, sigma });
+            self.depth_readout = None;
         }
         if guess == probe.guess { probe } else { window.probe(Resolution::Coarse, guess) }
     }
@@ -230,7 +233,10 @@ impl Estimates {
             knowledge: Knowledge::Estimated,
             value: Some(Value { value: found.seconds, sigma: found.sigma, printed: MILLISECONDS }),
             note: self.depth_readout.map_or_else(String::new, |seconds| {
-                format!("{:.1} ms of depth, as its jumps lie on the edges of colour", 1e3 * seconds)
+                let is_measured = self.longer_than_depth.is_some_and(|rows| rows.is_certain());
+                let why =
+                    if is_measured { "as its jumps lie on the edges of colour" } else { "taken for alike" };
+                format!("{:.1} ms of depth, {why}", 1e3 * seconds)
             }),
         }
     }

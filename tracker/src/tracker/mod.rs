@@ -4,6 +4,7 @@ mod bootstrap;
 mod bound;
 mod coarse_to_fine;
 mod config;
+mod evidence;
 mod frame;
 mod hindsight;
 mod history;

@@ -8,7 +8,7 @@ use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::{Frame, GyroReading};
 use super::history::Motion;
 use super::keyframe_path::{PathError, PathRate};
-use super::policy::{Evidence, Typical, fits_badly, is_blind, judge, wants_keyframe};
+use super::policy::{Typical, fits_badly, is_blind, wants_keyframe};
 use super::recovery::RecentKeyframes;
 use super::result::{Doubt, FrameResult, FrameStatus, Revision};
 use crate::align::{AlignScratch, Alignment, Estimate, FrameData, LevelOutcome, ReferenceData, blur_length};
@@ -376,36 +376,6 @@ impl<'m> Tracker<'m> {
         };
         self.work += aligned.work;
         aligned
-    }
-
-    pub(super) fn judge(
-        &self,
-        outcome: &LevelOutcome,
-        motion: &Motion,
-        frame: &Frame,
-    ) -> (FrameStatus, Option<Doubt>) {
-        judge(outcome, &self.evidence(outcome, motion, frame), &self.typical)
-    }
-
-    /// Whether a hand can have moved the camera where an alignment ended.
-    fn is_reachable(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> bool {
-        let mid = outcome.estimate.keyframe_from_camera.mid();
-        motion.can_reach(&self.keyframe.world_from_keyframe.compose(&mid), frame.timestamp)
-    }
-
-    fn evidence(&self, outcome: &LevelOutcome, motion: &Motion, frame: &Frame) -> Evidence {
-        let keypoints = self.keyframe.finest_keypoints();
-        let total = keypoints.len().max(1) as f32;
-        let mid = outcome.estimate.keyframe_from_camera.mid();
-        let path = ExposureTrajectory { start: RigidTransform::identity(), end: mid };
-        Evidence {
-            overlap: outcome.patches_in_view as f32 / total,
-            inliers: outcome.patches as f32 / total,
-            flow: self.blur_length(&path),
-            blur: self.blur_length(&exposure_of(&outcome.estimate.path(), &self.timing)),
-            depth_share: self.depth_share,
-            is_reachable: self.is_reachable(outcome, motion, frame),
-        }
     }
 
     /// Takes an alignment as the frame's poses.

@@ -20,6 +20,14 @@ const SETTLED: f64 = 0.01;
 const COARSE_ROUNDS: usize = 1;
 const FINE_ROUNDS: usize = 3;
 
+/// A step tells whether the motion depends on the exposure when it was longer than this; it does when the motion took back this
+/// share of it. Where rows tell the motion, whatever their exposure, it does not, and every step would lead to the next.
+const TELLING_STEP: f64 = 0.05;
+const MIN_TAKEN_BACK: f64 = 0.2;
+
+/// Relative standard deviation of exposure times that motion does not tell.
+const UNTOLD: f64 = 0.5;
+
 /// Rounds after which the power of a response agrees with the motion, and the change that is no more than noise.
 const POWER_ROUNDS: usize = 2;
 const SAME_POWER: f64 = 0.05;
@@ -40,6 +48,13 @@ pub(super) struct ExposureTimes {
     pub(super) relative_sigma: f64,
 }
 
+/// Where the search for exposure times ended.
+struct Settled {
+    probe: Probe,
+    /// Whether the motion depends on them.
+    is_told: bool,
+}
+
 /// Finds exposure times from a window that is tracked with the readout and the depth delay of a guess.
 pub(super) struct ExposureSearch<'a> {
     pub(super) window: &'a Window<'a>,
@@ -56,20 +71,22 @@ impl ExposureSearch<'_> {
                 start = self.window.probe(Resolution::Coarse, Guess { exposures, ..start.guess });
             }
         }
-        self.settle(Resolution::Coarse, start)
+        Some(self.settle(Resolution::Coarse, start)?.probe)
     }
 
     /// Exposure times of all frames from those that coarse pictures tell, which is nearly all of it: a lens that is soft over
     /// a pixel or two makes the last few percent.
     pub(super) fn fine(&self, guess: Guess) -> Option<ExposureTimes> {
         let (fine, power) = self.follow_response(self.window.probe(Resolution::Fine, guess));
-        let Probe { guess, tracked } = self.settle(Resolution::Fine, fine)?;
+        let Settled { probe: Probe { guess, tracked }, is_told } = self.settle(Resolution::Fine, fine)?;
         let brightness = if self.window.is_whole() {
             follow_brightness(&tracked, &guess)
         } else {
             follow_brightness(&self.window.recording.track_everything(&guess), &guess)
         };
-        self.judged(&guess, &tracked, raised(&brightness, power))
+        let found = self.judged(&guess, &tracked, raised(&brightness, power))?;
+        let relative_sigma = if is_told { found.relative_sigma } else { UNTOLD };
+        Some(ExposureTimes { relative_sigma, ..found })
     }
 
     /// Exposure times by brightness, unless one time for all fits the motion better.
@@ -116,8 +133,8 @@ impl ExposureSearch<'_> {
     /// motion.
     ///
     /// Rows and the smoothness of motion pull the path towards the exposure that is supposed, so a factor is too near to
-    /// 1. Where none is found any more the exposure is right.
-    fn settle(&self, resolution: Resolution, start: Probe) -> Option<Probe> {
+    /// 1. Where none is found any more the exposure is right. It ends, too, where the motion does not depend on the exposure.
+    fn settle(&self, resolution: Resolution, start: Probe) -> Option<Settled> {
         let rounds = match resolution {
             Resolution::Coarse => COARSE_ROUNDS,
             Resolution::Fine => FINE_ROUNDS,
@@ -129,6 +146,12 @@ impl ExposureSearch<'_> {
             let step = exposure::factor(&observed, &probe.guess.exposures)?.median.max(0.05).ln();
             if step.abs() < SETTLED || round == rounds {
                 break;
+            }
+            if let Some((before, taken)) = last
+                && before.abs() > TELLING_STEP
+                && (before - step) / taken < MIN_TAKEN_BACK
+            {
+                return Some(Settled { probe, is_told: false });
             }
             // Secant on the logarithm: how much of a step the motion took back the last time.
             let gain = match last {
@@ -144,7 +167,7 @@ impl ExposureSearch<'_> {
             }
             probe = self.window.probe(resolution, guess);
         }
-        Some(probe)
+        Some(Settled { probe, is_told: true })
     }
 
     /// Seconds between frames.

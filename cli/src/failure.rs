@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::fmt;
 use std::io;
+use std::path::Path;
 
 use mba_mapper::FileError;
 use mba_mapper::output::OutputError;
@@ -41,11 +42,21 @@ pub trait OrBadInput<T> {
     /// # Errors
     /// The marked error.
     fn or_bad_input(self, hint: impl Into<String>) -> anyhow::Result<T>;
+
+    /// [`or_bad_input`](Self::or_bad_input) for errors about what a file holds that do not name the file.
+    ///
+    /// # Errors
+    /// The marked error, after the name of the file.
+    fn or_bad_content(self, of: &Path, hint: impl Into<String>) -> anyhow::Result<T>;
 }
 
 impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrBadInput<T> for Result<T, E> {
     fn or_bad_input(self, hint: impl Into<String>) -> anyhow::Result<T> {
         self.map_err(|source| BadInput { source: source.into(), hint: hint.into() }.into())
+    }
+
+    fn or_bad_content(self, of: &Path, hint: impl Into<String>) -> anyhow::Result<T> {
+        self.map_err(|source| bad_input(format!("{}: {}", of.display(), source.into()), hint))
     }
 }
 

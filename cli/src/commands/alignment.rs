@@ -32,7 +32,8 @@ pub fn align(run: &Run, file: &Path, max_dt: f64) -> anyhow::Result<PoseAlignmen
         .filter(|(_, record)| record.status != FrameStatus::Lost)
         .map(|(exposure, _)| mid_pose(exposure))
         .collect();
-    align_poses(&reference, &tracked, max_dt).or_bad_input(
+    align_poses(&reference, &tracked, max_dt).or_bad_content(
+        file,
         "--align needs a trajectory of the same recording; --max-dt is the time difference allowed",
     )
 }

@@ -30,6 +30,9 @@ const VIEW_SIZE: [usize; 2] = [320, 240];
 /// Angle between the left and the right border of depth images, degrees.
 const VIEW_ANGLE: f64 = 60.0;
 
+/// Advice for files without a surface.
+const EMPTY: &str = "give files with points or triangles";
+
 /// What is printed.
 #[derive(Serialize)]
 struct Report {
@@ -63,7 +66,8 @@ pub fn run(args: &EvalMesh, console: &Console) -> anyhow::Result<()> {
         has_triangles(&args.reference, &true_mesh)?;
         has_triangles(&args.estimate, &estimate)?;
     }
-    let reference = points(&true_mesh, args.samples);
+    let reference = points(&args.reference, &true_mesh, args.samples)?;
+    let sampled = |estimate: &Mesh| points(&args.estimate, estimate, args.samples);
     let alignment = match (&args.align, &args.trajectory) {
         (Some(file), Some(run)) => Some(align(&open::run(run)?, file, args.max_dt)?),
         _ => None,
@@ -71,15 +75,15 @@ pub fn run(args: &EvalMesh, console: &Console) -> anyhow::Result<()> {
     if let Some(alignment) = &alignment {
         estimate.transform(&alignment.reference_from_estimate);
     }
-    let icp = args.icp.then(|| {
-        let refined = refine_by_icp(&reference, &points(&estimate, args.samples), ICP_REACH);
-        let motion = Motion::of(&refined, &estimate);
+    let mut icp = None;
+    if args.icp {
+        let refined = refine_by_icp(&reference, &sampled(&estimate)?, ICP_REACH);
+        icp = Some(Motion::of(&refined, &estimate));
         estimate.transform(&refined);
-        motion
-    });
-    let figures = evaluate_surface(&reference, &points(&estimate, args.samples), &args.threshold_cm)
-        .or_bad_input("give files with points or triangles")?;
-    let depth = views.map(|views| depth(&true_mesh, &estimate, &views)).transpose()?;
+    }
+    let figures = evaluate_surface(&reference, &sampled(&estimate)?, &args.threshold_cm)
+        .or_bad_content(&args.estimate, EMPTY)?;
+    let depth = views.map(|views| depth(&args.reference, &true_mesh, &estimate, &views)).transpose()?;
     let report = Report { figures, depth, alignment: alignment.as_ref().map(AlignmentFigures::from), icp };
     console.result(&report, table)
 }
@@ -115,18 +119,32 @@ fn has_triangles(path: &Path, mesh: &Mesh) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn depth(reference: &Mesh, estimate: &Mesh, views: &[RigidTransform]) -> anyhow::Result<MeshDepthFigures> {
+fn depth(
+    file: &Path,
+    reference: &Mesh,
+    estimate: &Mesh,
+    views: &[RigidTransform],
+) -> anyhow::Result<MeshDepthFigures> {
     let [width, height] = VIEW_SIZE;
     let focal = 0.5 * width as f64 / (0.5 * VIEW_ANGLE.to_radians()).tan();
     let [cx, cy] = VIEW_SIZE.map(|length| 0.5 * (length as f64 - 1.0));
     let camera = PinholeCamera { width, height, fx: focal, fy: focal, cx, cy };
-    evaluate_mesh_depth(reference, estimate, &camera, views).or_bad_input(
+    evaluate_mesh_depth(reference, estimate, &camera, views).or_bad_content(
+        file,
         "--views needs camera-to-world poses in the frame of the reference, e.g. the ground truth",
     )
 }
 
-fn points(mesh: &Mesh, samples: u32) -> Vec<[f32; 3]> {
-    sample_surface(mesh, samples as usize)
+/// Points on the surface of a file.
+fn points(path: &Path, mesh: &Mesh, samples: u32) -> anyhow::Result<Vec<[f32; 3]>> {
+    let points = sample_surface(mesh, samples as usize);
+    if points.is_empty() {
+        return Err(bad_input(
+            format!("{} has no surface: there are no points on it", path.display()),
+            EMPTY,
+        ));
+    }
+    Ok(points)
 }
 
 impl Motion {

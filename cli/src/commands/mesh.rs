@@ -56,7 +56,7 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
     let trim = Trim { least_area: 1e-4 * args.least_area_cm2 };
     let mut mesh = surface_of_map(map, &mut source, &settings, &trim)
         .map_err(|error| (hint(&error), error))
-        .or_else(|(hint, error)| Err(error).or_bad_input(hint))?;
+        .or_else(|(hint, error)| Err(error).or_bad_content(&run.folder, hint))?;
     source.progress.finish_and_clear();
     if mesh.triangles.is_empty() {
         let message = format!("no keyframe sees a surface in the map of {}", run.folder.display());

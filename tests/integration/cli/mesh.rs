@@ -219,7 +219,7 @@ fn what_cannot_be_meshed_is_named() {
     fs::write(place.path().join("late.txt"), "99 0 0 0 0 0 0 1\n").unwrap();
     let late = place.path().join("late.txt");
     let refused = mesh(place.path(), "mesh.ply", &["--align", late.to_str().unwrap()]);
-    refused.assert_error(2, &["none of 2 estimated poses"]);
+    refused.assert_error(2, &["late.txt", "none of 2 estimated poses"]);
     fs::remove_file(place.path().join("run/map.ply")).unwrap();
     mesh(place.path(), "mesh.ply", &[]).assert_error(2, &["run has no map"]);
 }
@@ -237,7 +237,7 @@ fn what_cannot_be_compared_is_named() {
     refused(&format!("{header}end_header\n"), &["bad.ply", "vertices have no property \"z\""]);
     refused(&format!("{header}property float z\nend_header\n1 2 3\n"), &["bad.ply", "the file ends after 1"]);
     let empty = header.replace("9000000000000000000", "0");
-    refused(&format!("{empty}property float z\nend_header\n"), &["the estimated surface has no points"]);
+    refused(&format!("{empty}property float z\nend_header\n"), &["bad.ply has no surface"]);
     eval(place.path(), "absent.ply", &[]).assert_error(2, &["absent.ply"]);
     let alone = eval(place.path(), "points.ply", &["--align", "groundtruth.txt"]);
     assert_eq!(alone.code, Some(2), "{}", alone.stderr);

@@ -48,8 +48,9 @@ impl<'m> BlurFlow<'m> {
     }
 
     /// Computes the displacements for the exposures of the rows of a keyframe along its path `keyframe_from_camera`,
-    /// seen from its own mid pose, with the keyframe's surface planes on pyramid level `planes_level`; blocks without a
-    /// plane take `fallback_inverse_depth`. Returns the longest displacement in pixels.
+    /// seen from its own mid pose, with surface planes on pyramid level `planes_level`; blocks without a plane take
+    /// `fallback_inverse_depth`. Each row is where it was captured: its displacement is seen from the middle of its own
+    /// exposure. Returns the longest displacement in pixels.
     pub fn fill(
         &mut self,
         keyframe_from_camera: &BowedTrajectory,
@@ -69,8 +70,11 @@ impl<'m> BlurFlow<'m> {
             let v = ((block / per_row) * BLOCK_HEIGHT) as f32 + 0.5 * (BLOCK_HEIGHT - 1) as f32;
             if timing.reaches_outside() && block % per_row == 0 {
                 let middle = timing.row_time(f64::from(v), self.height);
-                ends = [-0.5, 0.5]
-                    .map(|end| EndView::new(&keyframe_from_camera.at(middle + end * timing.exposure)));
+                let row_from_keyframe = keyframe_from_camera.at(middle).inverse();
+                ends = [-0.5, 0.5].map(|end| {
+                    let end = keyframe_from_camera.at(middle + end * timing.exposure);
+                    EndView::new(&row_from_keyframe.compose(&end))
+                });
             }
             let at = |x: f32| PinholeCamera::pixel_at_level(x, 0, planes_level);
             let rho = planes.inverse_depth(at(u), at(v)).unwrap_or(fallback_inverse_depth);

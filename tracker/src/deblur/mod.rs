@@ -68,9 +68,18 @@ impl<'m> DeblurScratch<'m> {
         })
     }
 
-    /// Remembers the image as captured, for [`Self::deblur`].
+    /// Remembers the image as captured, for [`Self::deblur`]; nothing if the memory is for no images at all.
     pub fn capture(&mut self, image: &[f32]) {
-        self.captured.copy_from_slice(image);
+        if !self.captured.is_empty() {
+            self.captured.copy_from_slice(image);
+        }
+    }
+
+    /// Writes back the image as captured, if it is remembered.
+    pub fn restore(&self, image: &mut [f32]) {
+        if !self.captured.is_empty() {
+            image.copy_from_slice(self.captured);
+        }
     }
 
     /// Writes to `sharp` the remembered image deblurred along the flow, whose longest displacement is `longest`

@@ -1,9 +1,11 @@
 //! Images in the caller's memory: undistortion, views of input frames and linear-light pyramids.
 
+mod bilinear;
 mod pyramid;
 mod undistort;
 mod view;
 
+pub(crate) use bilinear::{BilinearSampler, Cell, Sampled};
 pub use pyramid::{GreyLevel, GreyPyramid, LevelImage, MAX_LEVELS};
 pub use undistort::{
     BufferSizeError, NO_SOURCE, PixelRectangle, SourcePosition, fill_source_map, region_with_source,

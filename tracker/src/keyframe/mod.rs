@@ -2,6 +2,7 @@
 
 mod frame;
 mod rectify;
+mod resample;
 mod rolling_fusion;
 mod row_views;
 mod select;

@@ -4,6 +4,9 @@
 //! colour lies beside it. A frame's own path says by how much. Without this every later frame would be compared with a
 //! sheared reference.
 
+use fearless_simd::Level;
+
+use super::resample::{Shifts, resample};
 use super::row_views::{RowViews, pixel_of, ray_of};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::LevelImage;
@@ -14,6 +17,9 @@ use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 /// Rounds of looking where a point was seen when the row of the last guess was exposed. Each leaves the row's motion per
 /// row, below a fifth, of the error before.
 const ROUNDS: usize = 3;
+
+/// The same from a guess that is right but for parallax.
+const SHIFT_ROUNDS: usize = 2;
 
 /// Memory for the keyframe as it was captured.
 #[derive(Debug)]
@@ -70,7 +76,12 @@ impl<'m> RectifyScratch<'m> {
         }
     }
 
-    /// Writes back a keyframe as it was captured.
+    /// The picture that is given one time; empty if the memory is not for rows with times of their own.
+    pub fn image(&mut self) -> &mut [f32] {
+        self.image
+    }
+
+    /// Writes back the picture and the depth that are given one time.
     pub fn restore(&self, image: &mut [f32], depth: &mut [f32]) {
         if !self.image.is_empty() {
             image.copy_from_slice(self.image);
@@ -85,6 +96,7 @@ impl<'m> RectifyScratch<'m> {
     /// the mean depth. Returns the largest shift of the picture in pixels.
     pub fn rectify(
         &mut self,
+        simd: Level,
         keyframe_from_camera: &BowedTrajectory,
         timing: &FrameTiming,
         camera: &PinholeCamera,
@@ -94,7 +106,7 @@ impl<'m> RectifyScratch<'m> {
         if !self.depth.is_empty() && (timing.depth_time != 0.0 || timing.depth_readout != 0.0) {
             self.rectify_depth(keyframe_from_camera, timing, camera, depth);
         }
-        self.rectify_image(keyframe_from_camera, timing, camera, image, depth)
+        self.rectify_image(simd, keyframe_from_camera, timing, camera, image, depth)
     }
 
     /// Moves `depth` as if the camera that measured it had been at `keyframe_from_camera` instead of in the keyframe.
@@ -114,6 +126,7 @@ impl<'m> RectifyScratch<'m> {
     /// Gives the remembered picture another path of the keyframe, see [`Self::rectify`]; depth stays.
     pub fn rectify_image(
         &mut self,
+        simd: Level,
         keyframe_from_camera: &BowedTrajectory,
         timing: &FrameTiming,
         camera: &PinholeCamera,
@@ -124,7 +137,9 @@ impl<'m> RectifyScratch<'m> {
             return 0.0;
         }
         let longest = self.find_shifts(keyframe_from_camera, timing, camera, depth);
-        self.resample(camera, depth, image);
+        let source = LevelImage { pixels: self.image, width: camera.width, height: camera.height };
+        let shifts = Shifts { at_nodes: self.shift, width: depth.width, height: depth.height, level: depth.level };
+        resample(simd, &source, &shifts, image);
         longest
     }
 
@@ -177,54 +192,23 @@ impl<'m> RectifyScratch<'m> {
         let views = RowViews::new(path, |v| timing.row_time(v, camera.height), camera.height);
         let fallback = depth.mean().unwrap_or(0.0);
         let mut longest_squared = 0.0f32;
+        // The row in which the pixel beside was seen is the first guess.
+        let mut beside = 0.0;
         for (index, shift) in self.shift.iter_mut().enumerate() {
             let at = |x: usize| PinholeCamera::pixel_at_level(x as f32, depth.level, 0);
             let (u, v) = (at(index % depth.width), at(index / depth.width));
             let rho = if depth.values[index] > 0.0 { depth.values[index] } else { fallback };
             let ray = ray_of(camera, u, v);
+            let mut row = v + beside;
             let mut seen = [u, v];
-            for _ in 0..ROUNDS {
-                seen = views.project(&ray, rho, camera, seen[1]).unwrap_or([u, v]);
+            for _ in 0..SHIFT_ROUNDS {
+                seen = views.project(&ray, rho, camera, row).unwrap_or([u, v]);
+                row = seen[1];
             }
             *shift = [seen[0] - u, seen[1] - v];
+            beside = shift[1];
             longest_squared = longest_squared.max(shift[0] * shift[0] + shift[1] * shift[1]);
         }
         crate::math::sqrt_f32(longest_squared)
     }
-
-    /// The remembered image at every pixel plus its shift, both interpolated bilinearly; the border is continued.
-    fn resample(&self, camera: &PinholeCamera, depth: &InverseDepthMap, image: &mut [f32]) {
-        let source = LevelImage { pixels: self.image, width: camera.width, height: camera.height };
-        let node = |x: usize, count: usize| {
-            let at = PinholeCamera::pixel_at_level(x as f32, 0, depth.level).clamp(0.0, (count - 1) as f32);
-            let first = (at as usize).min(count.saturating_sub(2));
-            (first, at - first as f32)
-        };
-        for (v, row) in image.chunks_exact_mut(camera.width).enumerate() {
-            let (j, fv) = node(v, depth.height);
-            let (above, below) = (&self.shift[j * depth.width..], &self.shift[(j + 1) * depth.width..]);
-            for (u, light) in row.iter_mut().enumerate() {
-                let (i, fu) = node(u, depth.width);
-                let shift: [f32; 2] = core::array::from_fn(|k| {
-                    let top = above[i][k] + fu * (above[i + 1][k] - above[i][k]);
-                    let bottom = below[i][k] + fu * (below[i + 1][k] - below[i][k]);
-                    top + fv * (bottom - top)
-                });
-                *light = continued(&source, u as f32 + shift[0], v as f32 + shift[1]);
-            }
-        }
-    }
-}
-
-/// Bilinear intensity, with the border continued.
-fn continued(image: &LevelImage, u: f32, v: f32) -> f32 {
-    let (last_u, last_v) = ((image.width - 1) as f32, (image.height - 1) as f32);
-    let (u, v) = (u.clamp(0.0, last_u), v.clamp(0.0, last_v));
-    let (i, j) = ((u as usize).min(image.width - 2), (v as usize).min(image.height - 2));
-    let (fu, fv) = (u - i as f32, v - j as f32);
-    let top = &image.pixels[j * image.width + i..][..2];
-    let bottom = &image.pixels[(j + 1) * image.width + i..][..2];
-    let above = top[0] + fu * (top[1] - top[0]);
-    let below = bottom[0] + fu * (bottom[1] - bottom[0]);
-    above + fv * (below - above)
 }

@@ -112,12 +112,14 @@ impl Tracker<'_> {
     pub(super) fn exchange_with_keyframe(&mut self, path: BowedTrajectory) {
         let keyframe = &mut self.keyframe;
         self.rectify.restore(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
+        self.deblur.restore(keyframe.pyramid.levels[0].pixels);
         keyframe.pyramid.reduce();
         mem::swap(&mut self.pyramid, &mut keyframe.pyramid);
         mem::swap(&mut self.depth, &mut keyframe.depth);
         mem::swap(&mut self.timing, &mut keyframe.timing);
         mem::swap(&mut self.span, &mut self.keyframe_span);
         self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
+        self.deblur.capture(keyframe.pyramid.levels[0].pixels);
         keyframe.restart_surface();
         self.set_keyframe_path(path);
     }

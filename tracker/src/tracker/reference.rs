@@ -41,6 +41,7 @@ impl Tracker<'_> {
         self.keyframe.blur = blur;
         self.keyframe.frame_index = self.frames;
         self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
+        self.deblur.capture(self.keyframe.pyramid.levels[0].pixels);
         self.keyframe.restart_surface();
         self.brightness = BrightnessModel::default();
         let deblurred = self.sharpen_keyframe();
@@ -55,15 +56,17 @@ impl Tracker<'_> {
         self.sharpen_keyframe();
     }
 
-    /// Gives the keyframe one time and deblurs it, with its own motion, and selects its keypoints; `false` if there is
-    /// nothing to do.
+    /// Deblurs the keyframe as it was captured, gives it one time, with its own motion, and selects its keypoints; `false`
+    /// if there is nothing to do.
     pub(super) fn sharpen_keyframe(&mut self) -> bool {
         self.work.image_pixels += self.pixels();
         let Some(path) = self.keyframe.keyframe_from_camera else { return false };
         let timing = self.keyframe.timing;
+        let deblurred = self.deblur_keyframe(&path);
         if timing.reaches_outside() {
             let keyframe = &mut self.keyframe;
             self.rectify.rectify(
+                self.simd,
                 &path,
                 &timing,
                 &self.config.camera,
@@ -71,38 +74,40 @@ impl Tracker<'_> {
                 &mut keyframe.depth,
             );
             keyframe.restart_surface();
-            keyframe.pyramid.reduce();
+        } else if !deblurred {
+            return false;
         }
-        if self.deblur_keyframe(&path) {
-            return true;
-        }
-        if timing.reaches_outside() {
-            self.select_keypoints();
-        }
-        timing.reaches_outside()
+        self.keyframe.pyramid.reduce();
+        self.select_keypoints();
+        true
     }
 
-    /// Deblurs the keyframe with its path and selects its keypoints; `false` if it is not worth it.
-    pub(super) fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
+    /// Deblurs the keyframe, whose surface is as it was captured, with its path; `false` if it is not worth it.
+    ///
+    /// Where rows were exposed one after the other the result is the picture that is given one time afterwards: blur lies
+    /// along the motion of each row, and another path shears the same sharp picture.
+    fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
         let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
         if self.config.reference == ReferenceMode::Raw || !worth {
             return false;
         }
         let Some(typical) = self.keyframe.depth.mean() else { return false };
+        let timing = self.keyframe.timing;
         let longest = self.deblur.flow.fill(
             path,
-            &self.keyframe.timing,
+            &timing,
             &self.config.camera,
             &self.keyframe.planes,
             self.config.surface_level,
             typical,
         );
-        let image = &mut self.keyframe.pyramid.levels[0];
-        self.deblur.capture(image.pixels);
-        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, image.pixels);
+        let sharp = if timing.is_rolling() {
+            self.rectify.image()
+        } else {
+            &mut *self.keyframe.pyramid.levels[0].pixels
+        };
+        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, sharp);
         self.work.blur_taps += report.taps;
-        self.keyframe.pyramid.reduce();
-        self.select_keypoints();
         true
     }
 
@@ -163,18 +168,16 @@ impl Tracker<'_> {
         self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
         self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
         self.keyframe.refit_surface();
-        let pixels = &mut *self.keyframe.pyramid.levels[0].pixels;
         self.rectify.rectify_image(
+            self.simd,
             &path,
             &self.keyframe.timing,
             &self.config.camera,
-            pixels,
+            self.keyframe.pyramid.levels[0].pixels,
             &self.keyframe.depth,
         );
         self.keyframe.pyramid.reduce();
-        if !self.deblur_keyframe(&path) {
-            self.select_keypoints();
-        }
+        self.select_keypoints();
     }
 
     pub(super) fn select_keypoints(&mut self) {

@@ -20,11 +20,11 @@
 
 use fearless_simd::prelude::*;
 
-use super::bilinear::{BilinearSampler, Cell, Sampled};
 use super::pattern::{PATCH_PIXELS, PATTERN_DU_F32, PATTERN_DV_F32};
 use super::problem::{LINEAR_PATH, PatchRows, PatchSite, PatchValues, TransferProblem};
 use super::reference::{MIN_PLANE_DISTANCE, MIN_RAY_Z};
 use super::virtual_view::{MAX_VIRTUAL_VIEWS, VirtualView};
+use crate::image::{BilinearSampler, Cell, Sampled};
 
 /// Virtual views whose samples are located before the first of them is read.
 const BATCH: usize = 8;

@@ -5,7 +5,6 @@
 //! the blurred frame should show (MBA-VO and MBA-SLAM, with the corrections stated at each formula).
 
 mod accumulate;
-mod bilinear;
 mod evaluate;
 mod kernel;
 mod pattern;

@@ -143,25 +143,24 @@ impl KeyframeDeblurrer {
         let mut rgb = frame.rgb.clone();
         for channel in 0..3 {
             self.linearise(&frame.rgb, channel, light);
-            if self.rolls() {
-                rectify.capture(light, surface.map.values);
-                rectify.rectify_image(
-                    &path.reference_from_camera,
-                    &path.timing,
-                    &self.camera,
-                    light,
-                    &surface.map,
-                );
-                if !BLUR_RANGE.contains(&longest) {
-                    self.develop(light, channel, &mut rgb);
-                    continue;
+            rectify.capture(light, surface.map.values);
+            if BLUR_RANGE.contains(&longest) {
+                scratch.capture(light);
+                // Blur lies along the motion of each row, so rows are given one time afterwards.
+                let sharp = if self.rolls() { rectify.image() } else { &mut *light };
+                if !scratch.deblur(self.simd, longest, iterations, sharp).kept && !self.rolls() {
+                    // One blurred colour among sharp ones would show as coloured edges.
+                    return Ok(captured());
                 }
             }
-            scratch.capture(light);
-            if !scratch.deblur(self.simd, longest, iterations, light).kept && !self.rolls() {
-                // One blurred colour among sharp ones would show as coloured edges.
-                return Ok(captured());
-            }
+            rectify.rectify_image(
+                self.simd,
+                &path.reference_from_camera,
+                &path.timing,
+                &self.camera,
+                light,
+                &surface.map,
+            );
             self.develop(light, channel, &mut rgb);
         }
         Ok(Deblurred { rgb, sharpened: true })

@@ -117,13 +117,13 @@ fn a_known_offset_is_recovered_on_a_room_corner() {
 fn the_noise_scale_is_that_of_the_residuals() {
     with_problem(1, |problem| {
         let mut scratch = vec![0.0; 30_000];
-        let (exact, count) = problem.noise_scale(&offset(), &mut scratch);
+        let (exact, count) = problem.noise_scale(SimdLevel::new(), &offset(), &mut scratch);
         assert!(count > 15_000 && exact < 1e-4, "{count} points, {exact}");
         let back = moved(&offset(), &Vector6::new(0.0, 0.0, 0.02, 0.0, 0.0, 0.0));
-        let (scale, _) = problem.noise_scale(&back, &mut scratch);
+        let (scale, _) = problem.noise_scale(SimdLevel::new(), &back, &mut scratch);
         // 2 cm along the axis at about 2.2 m is 0.02 / 2.2^2 on the walls that face the camera.
         assert!((0.002..0.008).contains(&scale), "{scale}");
-        assert_eq!(problem.noise_scale(&offset(), &mut scratch[..50]).1, 50);
+        assert_eq!(problem.noise_scale(SimdLevel::new(), &offset(), &mut scratch[..50]).1, 50);
     });
 }
 
@@ -161,7 +161,7 @@ fn maps_without_depth_yield_zero_sums() {
         {
             let sums = linearise(&empty, &offset());
             assert_eq!((sums.points, sums.cost, sums.gradient), (0.0, 0.0, Vector6::zeros()));
-            assert_eq!(empty.noise_scale(&offset(), &mut scratch), (0.0, 0));
+            assert_eq!(empty.noise_scale(SimdLevel::new(), &offset(), &mut scratch), (0.0, 0));
         }
         let behind = RigidTransform::identity().perturbed(&Vector6::new(0.0, 0.0, -9.0, 0.0, 0.0, 0.0));
         assert_eq!(linearise(&problem, &behind).points, 0.0);

@@ -6,12 +6,12 @@
 //! about 70 arithmetic operations, no gathers. Sums are single precision within a batch, double across batches.
 
 use fearless_simd::{f32x8, prelude::*};
-use nalgebra::Vector3;
 
+use super::depth_samples::{DepthSamples, LANES};
 use super::depth_term::DepthSums;
 
-/// Points per batch.
-const BATCH: usize = 64;
+/// Points per batch: whole blocks.
+const BATCH: usize = 8 * LANES;
 
 /// Points waiting to be summed.
 pub(super) struct DepthBatch {
@@ -26,22 +26,25 @@ impl DepthBatch {
         Self { columns: [[0.0; BATCH]; 7], len: 0, delta }
     }
 
-    /// Adds a point with derivative `normal` by its position and lever arm `arm` about the camera centre.
+    /// Adds eight points, each residual divided by its standard deviation.
     #[inline(always)]
     pub(super) fn push<S: Simd>(
         &mut self,
         simd: S,
-        normal: Vector3<f32>,
-        arm: Vector3<f32>,
-        residual: f32,
+        samples: &DepthSamples<S>,
+        inverse_sigma: f32,
         sums: &mut DepthSums,
     ) {
-        let turn = arm.cross(&normal);
-        let row = [normal.x, normal.y, normal.z, turn.x, turn.y, turn.z, residual];
+        let [x, y, z] = samples.normal.map(|normal| normal * inverse_sigma);
+        let [a, b, c] = samples.arm;
+        // The lever arm times the normal, as a cross product.
+        let turn = [b * z - c * y, c * x - a * z, a * y - b * x];
+        let row = [x, y, z, turn[0], turn[1], turn[2], samples.residual * inverse_sigma];
         for (column, value) in self.columns.iter_mut().zip(row) {
-            column[self.len] = value;
+            value.store_slice(&mut column[self.len..self.len + LANES]);
         }
-        self.len += 1;
+        self.len += LANES;
+        sums.points += f64::from(samples.compared.to_bitmask().count_ones());
         if self.len == BATCH {
             self.flush(simd, sums);
         }
@@ -78,7 +81,6 @@ impl DepthBatch {
         }
         let total = |lanes: f32x8<S>| f64::from(lanes.as_slice().iter().sum::<f32>());
         sums.cost += total(cost);
-        sums.points += self.len as f64;
         let mut entries = hessian.into_iter();
         for (i, lanes) in gradient.into_iter().enumerate() {
             sums.gradient[i] += total(lanes);

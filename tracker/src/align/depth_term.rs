@@ -6,12 +6,12 @@
 //! the point-to-plane distance in units in which the sensor's noise is uniform.
 
 use fearless_simd::{Level, dispatch, prelude::*};
-use nalgebra::{Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector6};
 
 use super::depth_accumulate::DepthBatch;
+use super::depth_samples::DepthSampler;
 use super::scale::{SIGMA_PER_MEDIAN_ABSOLUTE, median};
 use crate::geometry::{PinholeCamera, RigidTransform};
-use crate::math::round_half_up_to_i32;
 use crate::surface::{InverseDepthMap, SurfacePlanes, spread_limit};
 use crate::transfer::RowBand;
 
@@ -35,16 +35,6 @@ pub struct DepthProblem<'a> {
     pub band: RowBand,
 }
 
-/// One compared point.
-struct DepthSample {
-    /// Inverse depth of the moved point minus that of the keyframe's surface, 1/m.
-    residual: f32,
-    /// Derivative of the residual by the moved point.
-    normal: Vector3<f32>,
-    /// The point relative to the camera centre, in keyframe axes, metres.
-    arm: Vector3<f32>,
-}
-
 /// Sums of the depth term for the mid pose, tangent (translation, left rotation) in the keyframe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthSums {
@@ -63,22 +53,43 @@ pub struct DepthSums {
 impl DepthProblem<'_> {
     /// Robust standard deviation of the residuals at `keyframe_from_camera`, 1/m, and the number of points behind
     /// it; `scratch` bounds the number of residuals that are looked at.
-    pub fn noise_scale(&self, keyframe_from_camera: &RigidTransform, scratch: &mut [f32]) -> (f32, usize) {
-        let count = self.absolute_residuals(keyframe_from_camera, scratch);
+    pub fn noise_scale(
+        &self,
+        level: Level,
+        keyframe_from_camera: &RigidTransform,
+        scratch: &mut [f32],
+    ) -> (f32, usize) {
+        let count = self.absolute_residuals(level, keyframe_from_camera, scratch);
         (noise_of(&mut scratch[..count]), count)
     }
 
     /// Writes the magnitudes of the residuals at `keyframe_from_camera`, 1/m, as many as fit; returns their number.
     pub(super) fn absolute_residuals(
         &self,
+        level: Level,
+        keyframe_from_camera: &RigidTransform,
+        magnitudes: &mut [f32],
+    ) -> usize {
+        dispatch!(level, simd => self.fill_magnitudes(simd, keyframe_from_camera, magnitudes))
+    }
+
+    #[inline(always)]
+    fn fill_magnitudes<S: Simd>(
+        &self,
+        simd: S,
         keyframe_from_camera: &RigidTransform,
         magnitudes: &mut [f32],
     ) -> usize {
         let mut count = 0;
-        self.for_each_sample(keyframe_from_camera, |sample| {
-            if let Some(magnitude) = magnitudes.get_mut(count) {
-                *magnitude = sample.residual.abs();
-                count += 1;
+        DepthSampler::new(self, keyframe_from_camera).for_each_block(simd, |samples| {
+            let compared = samples.compared.to_bitmask();
+            for (lane, residual) in samples.residual.as_slice().iter().enumerate() {
+                if compared >> lane & 1 == 1
+                    && let Some(magnitude) = magnitudes.get_mut(count)
+                {
+                    *magnitude = residual.abs();
+                    count += 1;
+                }
             }
         });
         count
@@ -114,9 +125,10 @@ impl DepthProblem<'_> {
         };
         let mut batch = DepthBatch::new(delta);
         let inverse_sigma = 1.0 / sigma;
-        let gated = self.for_each_sample(keyframe_from_camera, |sample| {
-            let (normal, residual) = (sample.normal * inverse_sigma, sample.residual * inverse_sigma);
-            batch.push(simd, normal, sample.arm, residual, &mut sums);
+        let mut gated = 0;
+        DepthSampler::new(self, keyframe_from_camera).for_each_block(simd, |samples| {
+            gated += samples.gated;
+            batch.push(simd, samples, inverse_sigma, &mut sums);
         });
         batch.flush(simd, &mut sums);
         // Without their cost, a step that brings points into the gate would look like a step uphill.
@@ -125,57 +137,6 @@ impl DepthProblem<'_> {
         sums.cost += sums.gated * f64::from(clipped * (self.gate * inverse_sigma - 0.5 * clipped));
         sums.hessian.fill_lower_triangle_with_upper_triangle();
         sums
-    }
-
-    /// Visits the samples within the gate; returns the number of those beyond it.
-    #[inline(always)]
-    fn for_each_sample(
-        &self,
-        keyframe_from_camera: &RigidTransform,
-        mut visit: impl FnMut(DepthSample),
-    ) -> usize {
-        let mut gated = 0;
-        let rotation = keyframe_from_camera.rotation_matrix().map(|x| x as f32);
-        let position = keyframe_from_camera.translation.map(|x| x as f32);
-        let (fx, fy) = (self.camera.fx as f32, self.camera.fy as f32);
-        let (cx, cy) = (self.camera.cx as f32, self.camera.cy as f32);
-        let (inverse_fx, inverse_fy) = (1.0 / fx, 1.0 / fy);
-        let width = self.current.width;
-        let first = self.band.first.next_multiple_of(self.stride);
-        for v in (first..self.band.end.min(self.current.height)).step_by(self.stride) {
-            let y = (v as f32 - cy) * inverse_fy;
-            let row_ray = rotation.column(1) * y + rotation.column(2);
-            for u in (0..width).step_by(self.stride) {
-                let rho = self.current.values[v * width + u];
-                if rho <= 0.0 {
-                    continue;
-                }
-                let x = (u as f32 - cx) * inverse_fx;
-                let arm = (row_ray + rotation.column(0) * x) * (1.0 / rho);
-                let point = arm + position;
-                if point.z < 0.05 {
-                    continue;
-                }
-                let inverse_z = 1.0 / point.z;
-                let (a, b) = (point.x * inverse_z, point.y * inverse_z);
-                let (ku, kv) = (fx * a + cx, fy * b + cy);
-                let Some(surface) = self.keyframe.sample(ku, kv) else { continue };
-                let residual = inverse_z - surface;
-                if residual.abs() >= self.gate {
-                    gated += 1;
-                    continue;
-                }
-                let index = round_half_up_to_i32(kv) as usize * width + round_half_up_to_i32(ku) as usize;
-                if self.planes.value[index] <= 0.0 {
-                    continue;
-                }
-                let su = self.planes.slope_u[index] * fx * inverse_z;
-                let sv = self.planes.slope_v[index] * fy * inverse_z;
-                let normal = Vector3::new(-su, -sv, su * a + sv * b - inverse_z * inverse_z);
-                visit(DepthSample { residual, normal, arm });
-            }
-        }
-        gated
     }
 }
 

@@ -83,7 +83,7 @@ pub(super) fn measure_depth<'a>(
     let mut count = 0;
     for (band, s) in objective.depth_bands() {
         problem.band = band;
-        count += problem.absolute_residuals(&estimate.path().at(s), &mut medians[count..]);
+        count += problem.absolute_residuals(objective.simd, &estimate.path().at(s), &mut medians[count..]);
     }
     let sigma = noise_of(&mut medians[..count]);
     if count * stride * stride * 4 < MIN_DEPTH_POINTS * 16 {

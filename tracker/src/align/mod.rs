@@ -10,6 +10,7 @@
 
 mod damping;
 mod depth_accumulate;
+mod depth_samples;
 pub mod depth_term;
 mod level;
 mod measure;

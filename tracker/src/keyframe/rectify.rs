@@ -138,7 +138,8 @@ impl<'m> RectifyScratch<'m> {
         }
         let longest = self.find_shifts(keyframe_from_camera, timing, camera, depth);
         let source = LevelImage { pixels: self.image, width: camera.width, height: camera.height };
-        let shifts = Shifts { at_nodes: self.shift, width: depth.width, height: depth.height, level: depth.level };
+        let shifts =
+            Shifts { at_nodes: self.shift, width: depth.width, height: depth.height, level: depth.level };
         resample(simd, &source, &shifts, image);
         longest
     }

@@ -36,15 +36,17 @@ fn stages(c: &mut Criterion) {
     let mut depth = InverseDepthMap::carve(&mut arena, &config.camera, config.surface_level).expect("memory");
     let mut keyframe = keyframe(&mut arena, config);
     c.bench_function("pyramid fill", |b| b.iter(|| pyramid.fill(&frame.colour, &luminance)));
-    c.bench_function("depth block mean", |b| b.iter(|| depth.fill(&frame.depth, config.metres_per_unit)));
+    c.bench_function("depth block mean", |b| {
+        b.iter(|| depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit))
+    });
     keyframe.pyramid.fill(&frame.colour, &luminance);
-    keyframe.depth.fill(&frame.depth, config.metres_per_unit);
-    c.bench_function("plane fit", |b| b.iter(|| keyframe.restart_surface()));
+    keyframe.depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit);
+    c.bench_function("plane fit", |b| b.iter(|| keyframe.restart_surface(SimdLevel::new())));
     c.bench_function("keypoint selection, all levels", |b| {
         b.iter(|| keyframe.select(0.02, config.align.dark_intensity, config.region));
     });
     let next = recording.view(1, 0.0).expect("a frame");
-    depth.fill(&next.depth, config.metres_per_unit);
+    depth.fill(SimdLevel::new(), &next.depth, config.metres_per_unit);
     let problem = DepthProblem {
         current: &depth,
         keyframe: &keyframe.depth,
@@ -69,8 +71,8 @@ fn deblurring(c: &mut Criterion) {
     let mut arena = Arena::new(&mut memory);
     let mut keyframe = keyframe(&mut arena, config);
     keyframe.pyramid.fill(&frame.colour, &LuminanceTable::new(&config.response));
-    keyframe.depth.fill(&frame.depth, config.metres_per_unit);
-    keyframe.restart_surface();
+    keyframe.depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit);
+    keyframe.restart_surface(SimdLevel::new());
     let mut scratch =
         DeblurScratch::carve(&mut arena, config.camera.width, config.camera.height).expect("memory");
     scratch.capture(keyframe.pyramid.levels[0].pixels);

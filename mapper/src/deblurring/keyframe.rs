@@ -189,12 +189,12 @@ impl KeyframeDeblurrer {
         let raw = DepthView::new(&frame.depth, frame.width, frame.height, frame.width)?;
         let mut map = InverseDepthMap::carve(arena, &self.camera, self.surface_level)?;
         let mut planes = SurfacePlanes::carve(arena, &self.camera, self.surface_level)?;
-        map.fill(&raw, self.metres_per_unit);
+        map.fill(self.simd, &raw, self.metres_per_unit);
         if self.rolls() {
             let depth_time = 0.5 + path.timing.depth_time;
             rectify.move_depth(&path.reference_from_camera.at(depth_time), &self.camera, &mut map);
         }
-        planes.fit(&map);
+        planes.fit(self.simd, &map);
         Ok(Surface { map, planes })
     }
 

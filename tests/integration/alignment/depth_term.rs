@@ -40,7 +40,7 @@ fn with_problem(stride: usize, check: impl FnOnce(DepthProblem<'_>)) {
     let current = InverseDepthMap { values: &mut current, width, height, level: 0 };
     let mut memory = vec![0; 1 << 20];
     let mut planes = SurfacePlanes::carve(&mut Arena::new(&mut memory), &camera, 0).expect("memory");
-    planes.fit(&keyframe);
+    planes.fit(SimdLevel::new(), &keyframe);
     let problem = DepthProblem {
         current: &current,
         keyframe: &keyframe,

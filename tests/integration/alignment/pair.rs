@@ -53,7 +53,7 @@ impl Images {
         let colour = ColourView::new(&self.grey, width, height, width, PixelFormat::Grey8).expect("grey");
         pyramid.fill(&colour, &LuminanceTable::new(&InverseResponse::linear()));
         let raw = DepthView::new(&self.depth, width, height, width).expect("depth");
-        depth.fill(&raw, (1.0 / DEPTH_SCALE) as f32);
+        depth.fill(SimdLevel::new(), &raw, (1.0 / DEPTH_SCALE) as f32);
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn align(
     let mut arena = Arena::new(&mut memory);
     let mut keyframe = Keyframe::carve(&mut arena, &camera, LEVELS, DEPTH_LEVEL).expect("memory");
     keyframe_images.fill(&mut keyframe.pyramid, &mut keyframe.depth);
-    keyframe.restart_surface();
+    keyframe.restart_surface(SimdLevel::new());
     keyframe.select(0.02, settings.dark_intensity, region);
     let mut pyramid = GreyPyramid::carve(&mut arena, &camera, LEVELS).expect("memory");
     let mut depth = InverseDepthMap::carve(&mut arena, &camera, DEPTH_LEVEL).expect("memory");

@@ -64,7 +64,7 @@ fn deblur(
         *rho = 1.0 / depth;
     }
     let mut planes = SurfacePlanes::carve(&mut arena, &camera, 0).expect("memory");
-    planes.fit(&map);
+    planes.fit(SimdLevel::new(), &map);
     let mut scratch = DeblurScratch::carve(&mut arena, camera.width, camera.height).expect("memory");
     let longest = scratch.flow.fill(
         &BowedTrajectory::without_bow(exposure(motion)),

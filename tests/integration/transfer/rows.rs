@@ -6,8 +6,8 @@ use mba_tracker::geometry::{RigidTransform, so3};
 use mba_tracker::simd::{Level, level_name, levels_up_to};
 use mba_tracker::trajectory::{BowedTrajectory, FrameTiming};
 use mba_tracker::transfer::{
-    BOWED_PATH, PATCH_PIXELS, PatchCost, RowBand, RowTimes, TransferProblem, VirtualView, evaluate_cost,
-    linearize, linearize_bowed,
+    BOWED_PATH, BowedSums, PATCH_PIXELS, PatchCost, PatchSite, RowBand, RowTimes, TransferProblem,
+    VirtualView, evaluate_cost, linearize, linearize_bowed,
 };
 use nalgebra::{SVector, Vector3, Vector6};
 
@@ -44,6 +44,16 @@ fn problem<'a>(scene: &'a TransferScene, views: &'a [VirtualView], band: RowBand
     TransferProblem { rows: RowTimes { centre: band.centre() as f32, step }, ..scene.problem_with(views) }
 }
 
+fn bowed_sums(
+    level: Level,
+    problem: TransferProblem,
+    sites: &[PatchSite],
+    patches: &mut [PatchCost],
+) -> BowedSums {
+    let mut parts = Some((problem, 0..sites.len()));
+    linearize_bowed(level, &mut parts, sites, &TransferScene::residual_model(), patches)
+}
+
 /// Relative errors of the gradient by (the ends, the bow), against differences of the cost in the `index`-th of `bands`.
 fn gradient_errors(level: Level, seed: u64, sites: usize, (index, bands): (usize, usize)) -> [f64; 2] {
     let model = TransferScene::residual_model();
@@ -61,7 +71,7 @@ fn gradient_errors(level: Level, seed: u64, sites: usize, (index, bands): (usize
     let path = path(&scene);
     let views = views_of(&path, &scene);
     let mut patches = vec![PatchCost::default(); scene.sites.len()];
-    linearize_bowed(level, &problem(&scene, &views, band), &scene.sites, &model, &mut patches);
+    bowed_sums(level, problem(&scene, &views, band), &scene.sites, &mut patches);
     let mut whole = patches.iter().map(|patch| patch.pixels == PATCH_PIXELS as f32);
     scene.sites.retain(|_| whole.next().unwrap_or(false));
     patches.truncate(scene.sites.len());
@@ -77,7 +87,7 @@ fn gradient_errors(level: Level, seed: u64, sites: usize, (index, bands): (usize
         step[i] = if i < 12 { STEP } else { 4.0 * STEP };
         (cost(&stepped(&path, &step)) - cost(&stepped(&path, &-step))) / (2.0 * step[i])
     });
-    let sums = linearize_bowed(level, &problem(&scene, &views, band), &scene.sites, &model, &mut patches);
+    let sums = bowed_sums(level, problem(&scene, &views, band), &scene.sites, &mut patches);
     let gradient = sums.gradient.fixed_rows::<BOWED_PATH>(0);
     [(0, 12), (12, 6)].map(|(first, count)| {
         let (found, expected) = (gradient.rows(first, count), difference.rows(first, count));
@@ -114,7 +124,7 @@ fn rows_at_the_same_time_are_those_of_the_plain_kernel() {
     let views = band.views(&straight, &still, VIEWS, &scene.camera, INVERSE_DEPTH).to_vec();
     let mut patches = vec![PatchCost::default(); scene.sites.len()];
     let plain = linearize(level, &scene.problem(), &scene.sites, &model, &mut patches);
-    let bowed = linearize_bowed(level, &scene.problem_with(&views), &scene.sites, &model, &mut patches);
+    let bowed = bowed_sums(level, scene.problem_with(&views), &scene.sites, &mut patches);
     assert_eq!(plain.pixels, bowed.pixels);
     assert!((plain.cost - bowed.cost).abs() < 1e-5 * plain.cost);
     let ends = bowed.gradient.fixed_rows::<12>(0) - plain.gradient.fixed_rows::<12>(0);

@@ -8,6 +8,7 @@
 //! Each data term is divided by its own robust noise scale, measured at the current estimate, so exact depth
 //! dominates where it is exact and a blurred reference loses weight where it does not fit.
 
+mod bands;
 mod damping;
 mod depth_accumulate;
 mod depth_samples;

@@ -6,6 +6,7 @@ use fearless_simd::Level;
 
 use nalgebra::{Matrix3, Matrix6, SMatrix, SVector, Vector6};
 
+use super::bands::Bands;
 use super::depth_term::{DepthProblem, DepthSums};
 use super::placement::MAX_BANDS;
 use super::prior::MotionPrior;
@@ -17,7 +18,7 @@ use crate::surface::{InverseDepthMap, SurfacePlanes};
 use crate::trajectory::{BowedTrajectory, FrameTiming, SampleRule};
 use crate::transfer::{
     self, BOWED_PATH, BrightnessModel, LINEAR_PATH, PatchCost, PatchSite, ROW_LENGTH, ResidualModel, RowBand,
-    RowTimes, TransferProblem, virtual_views,
+    RowTimes, TransferParts, TransferProblem, virtual_views,
 };
 use crate::work::Work;
 
@@ -226,26 +227,25 @@ impl Objective<'_> {
             depth_points: 0.0,
             depth_compared: 0.0,
         };
-        let bowed = self.frame.timing.reaches_outside();
-        self.for_each_band(estimate, self.sites, |problem, of_band| {
-            let (sites, costs) = (&self.sites[of_band.clone()], &mut costs[of_band]);
-            if bowed {
-                let of_band = transfer::linearize_bowed(self.simd, problem, sites, &self.model, costs);
-                sums.cost += of_band.cost;
-                sums.pixels += of_band.pixels;
-                for i in 0..BOWED_UNKNOWNS {
-                    sums.gradient[unknown_of_column(i)] += of_band.gradient[i];
-                    for j in 0..BOWED_UNKNOWNS {
-                        sums.hessian[(unknown_of_column(i), unknown_of_column(j))] += of_band.hessian[(i, j)];
-                    }
+        if self.frame.timing.reaches_outside() {
+            let mut bands = Bands::new(self, estimate, self.sites);
+            let all = transfer::linearize_bowed(self.simd, &mut bands, self.sites, &self.model, costs);
+            sums.cost = all.cost;
+            sums.pixels = all.pixels;
+            for i in 0..BOWED_UNKNOWNS {
+                sums.gradient[unknown_of_column(i)] = all.gradient[i];
+                for j in 0..BOWED_UNKNOWNS {
+                    sums.hessian[(unknown_of_column(i), unknown_of_column(j))] = all.hessian[(i, j)];
                 }
-            } else {
-                let all = transfer::linearize(self.simd, problem, sites, &self.model, costs);
-                sums.cost = all.cost;
-                sums.pixels = all.pixels;
-                sums.hessian.fixed_view_mut::<ROW_LENGTH, ROW_LENGTH>(0, 0).copy_from(&all.hessian);
-                sums.gradient.fixed_rows_mut::<ROW_LENGTH>(0).copy_from(&all.gradient);
             }
+            return sums;
+        }
+        self.for_each_band(estimate, self.sites, |problem, _| {
+            let all = transfer::linearize(self.simd, problem, self.sites, &self.model, costs);
+            sums.cost = all.cost;
+            sums.pixels = all.pixels;
+            sums.hessian.fixed_view_mut::<ROW_LENGTH, ROW_LENGTH>(0, 0).copy_from(&all.hessian);
+            sums.gradient.fixed_rows_mut::<ROW_LENGTH>(0).copy_from(&all.gradient);
         });
         sums
     }
@@ -264,28 +264,13 @@ impl Objective<'_> {
             let views = virtual_views(path, self.views, SampleRule::Midpoint, &self.camera);
             return visit(&self.transfer_problem(estimate, &views, RowTimes::default()), 0..sites.len());
         }
-        let path = estimate.path();
-        let height = self.frame.levels[self.level].height;
-        let bands = if timing.is_rolling() { timing.bands.clamp(1, MAX_BANDS) } else { 1 };
-        let mut first = 0;
-        for index in 0..bands {
-            let band = RowBand::new(index, bands, height);
-            // Sites are sorted by row where there is more than one band.
-            let end = match index + 1 == bands {
-                true => sites.len(),
-                false => sites.partition_point(|site| usize::try_from(site.v).is_ok_and(|v| v < band.end)),
-            };
-            if first < end {
-                let views = band.views(&path, timing, self.views, &self.camera, self.inverse_depth);
-                let rows =
-                    RowTimes { centre: band.centre() as f32, step: (timing.readout / height as f64) as f32 };
-                visit(&self.transfer_problem(estimate, &views, rows), first..end);
-            }
-            first = end;
+        let mut bands = Bands::new(self, estimate, sites);
+        while let Some((problem, of_band)) = bands.next_part() {
+            visit(&problem, of_band);
         }
     }
 
-    fn transfer_problem<'b>(
+    pub(super) fn transfer_problem<'b>(
         &'b self,
         estimate: &Estimate,
         views: &'b [transfer::VirtualView],

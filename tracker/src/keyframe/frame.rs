@@ -1,6 +1,7 @@
 //! A keyframe in the caller's memory.
 
 use arrayvec::ArrayVec;
+use fearless_simd::Level;
 
 use super::rolling_fusion::fuse_rolling_depth;
 use super::select::{Keypoint, SelectionSettings, select_keypoints};
@@ -115,15 +116,15 @@ impl<'m> Keyframe<'m> {
     }
 
     /// Starts anew with the depth map as it is: one measurement per pixel, planes fitted to it.
-    pub fn restart_surface(&mut self) {
+    pub fn restart_surface(&mut self, level: Level) {
         self.weights.fill(1.0);
         self.fusions = 0;
-        self.planes.fit(&self.depth);
+        self.planes.fit(level, &self.depth);
     }
 
     /// Fits the planes again after `depth` was moved as a whole; measurements keep their number.
-    pub fn refit_surface(&mut self) {
-        self.planes.fit(&self.depth);
+    pub fn refit_surface(&mut self, level: Level) {
+        self.planes.fit(level, &self.depth);
     }
 
     /// Averages in the depth map of a frame that moved along `keyframe_from_camera` and whose depth was measured at the times
@@ -131,6 +132,7 @@ impl<'m> Keyframe<'m> {
     /// has doubled, from two on.
     pub fn fuse_depth(
         &mut self,
+        level: Level,
         current: &InverseDepthMap,
         keyframe_from_camera: &BowedTrajectory,
         timing: &FrameTiming,
@@ -145,10 +147,10 @@ impl<'m> Keyframe<'m> {
         }
         self.fusions += 1;
         if self.fusions > 1 && self.fusions.is_power_of_two() {
-            self.planes.fit(&self.depth);
-            for (level, keypoints) in self.keypoints.iter_mut().enumerate() {
-                let at = |x: f32| PinholeCamera::pixel_at_level(x, level, self.depth.level);
-                for keypoint in &mut keypoints[..self.counts[level]] {
+            self.planes.fit(level, &self.depth);
+            for (pyramid_level, keypoints) in self.keypoints.iter_mut().enumerate() {
+                let at = |x: f32| PinholeCamera::pixel_at_level(x, pyramid_level, self.depth.level);
+                for keypoint in &mut keypoints[..self.counts[pyramid_level]] {
                     if let Some(rho) = self.planes.inverse_depth(at(keypoint.u), at(keypoint.v)) {
                         keypoint.inverse_depth = rho;
                     }

@@ -85,6 +85,7 @@ fn resample_rows<S: Simd>(simd: S, image: &LevelImage, shifts: &Shifts, out: &mu
 
 #[cfg(test)]
 mod tests {
+    use std::vec;
     use std::vec::Vec;
 
     use super::*;

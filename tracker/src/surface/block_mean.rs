@@ -1,8 +1,13 @@
 //! Block means of a raw depth map.
 
+use fearless_simd::{Level, dispatch, f32x8, prelude::*};
+
 use crate::geometry::PinholeCamera;
 use crate::image::DepthView;
 use crate::workspace::{Arena, WorkspaceError};
+
+/// Blocks that are averaged at the same time.
+const LANES: usize = 8;
 
 /// Inverse depth in 1/m on a pyramid level; 0 is missing.
 #[derive(Debug)]
@@ -43,17 +48,28 @@ impl<'m> InverseDepthMap<'m> {
     ///
     /// A block is missing when fewer than half of its pixels are measured or when they spread over more than one
     /// surface: a mean across a depth edge lies on neither side. Returns the share of blocks with a value.
-    pub fn fill(&mut self, raw: &DepthView, metres_per_unit: f32) -> f32 {
+    pub fn fill(&mut self, level: Level, raw: &DepthView, metres_per_unit: f32) -> f32 {
+        dispatch!(level, simd => self.fill_rows(simd, raw, metres_per_unit));
+        let measured = self.values.iter().filter(|rho| **rho > 0.0).count();
+        measured as f32 / (self.width * self.height).max(1) as f32
+    }
+
+    #[inline(always)]
+    fn fill_rows<S: Simd>(&mut self, simd: S, raw: &DepthView, metres_per_unit: f32) {
         let block = 1usize << self.level;
-        let mut measured = 0usize;
         for v in 0..self.height {
             let out = &mut self.values[v * self.width..][..self.width];
-            for (u, value) in out.iter_mut().enumerate() {
-                *value = block_inverse_depth(raw, u * block, v * block, block, metres_per_unit);
-                measured += usize::from(*value > 0.0);
+            let mut blocks = out.chunks_exact_mut(LANES);
+            let mut u = 0;
+            for values in &mut blocks {
+                block_means(simd, raw, u * block, v * block, block, metres_per_unit).store_slice(values);
+                u += LANES;
+            }
+            for value in blocks.into_remainder() {
+                *value = block_mean(raw, u * block, v * block, block, metres_per_unit);
+                u += 1;
             }
         }
-        measured as f32 / (self.width * self.height).max(1) as f32
     }
 
     /// Mean of the measured values, 1/m; `None` if there is none.
@@ -92,7 +108,44 @@ impl<'m> InverseDepthMap<'m> {
     }
 }
 
-fn block_inverse_depth(raw: &DepthView, u: usize, v: usize, block: usize, metres_per_unit: f32) -> f32 {
+/// [`block_mean`] of the eight blocks from `(u, v)` on.
+///
+/// A lane is a block: per pixel of the blocks one strided load, one division and about six operations. The sums are taken
+/// in the same order as for one block.
+#[inline(always)]
+fn block_means<S: Simd>(
+    simd: S,
+    raw: &DepthView,
+    u: usize,
+    v: usize,
+    block: usize,
+    metres_per_unit: f32,
+) -> f32x8<S> {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let (mut nearest, mut farthest) = (f32x8::splat(simd, f32::from(u16::MAX)), zero);
+    let (mut sum, mut count) = (zero, zero);
+    for row in 0..block {
+        let pixels = &raw.row(v + row)[u..][..LANES * block];
+        for column in 0..block {
+            let value = f32x8::from_fn(simd, |lane| f32::from(pixels[lane * block + column]));
+            let measured = value.simd_gt(0.0);
+            nearest = measured.select(nearest.min(value), nearest);
+            farthest = farthest.max(value);
+            sum += measured.select(one / value.max(1.0), zero);
+            count += measured.select(one, zero);
+        }
+    }
+    let per_metre = f32x8::splat(simd, 1.0 / metres_per_unit);
+    let (high, low) = (per_metre / nearest, per_metre / farthest.max(1.0));
+    // The limit is linear in the inverse depth.
+    let limit = low * (spread_limit(1.0) - spread_limit(0.0)) + spread_limit(0.0);
+    let enough = count.simd_gt(0.0) & (count * 2.0).simd_ge((block * block) as f32);
+    let kept = enough & (high - low).simd_le(limit);
+    kept.select(sum * per_metre / count.max(1.0), zero)
+}
+
+/// Mean inverse depth of the block of raw pixels from `(u, v)` on, 1/m; 0 where it is missing.
+fn block_mean(raw: &DepthView, u: usize, v: usize, block: usize, metres_per_unit: f32) -> f32 {
     let (mut nearest, mut farthest) = (u16::MAX, 0u16);
     let (mut sum, mut count) = (0.0f32, 0usize);
     for row in 0..block {
@@ -128,7 +181,7 @@ mod tests {
         let raw: Vec<u16> = (0..32 * 24).map(|k| (metres(k % 32, k / 32) * 1e4).round() as u16).collect();
         let mut memory = vec![0; 32 * 24 * 4 + 128];
         let mut map = InverseDepthMap::carve(&mut Arena::new(&mut memory), &CAMERA, level).expect("memory");
-        let share = map.fill(&DepthView::new(&raw, 32, 24, 32).expect("a view"), 1e-4);
+        let share = map.fill(Level::new(), &DepthView::new(&raw, 32, 24, 32).expect("a view"), 1e-4);
         (map.values.to_vec(), share)
     }
 

@@ -1,5 +1,7 @@
 //! Local planes of a keyframe's surface.
 
+use fearless_simd::{Level, dispatch, f32x8, prelude::*};
+
 use super::block_mean::{InverseDepthMap, spread_limit};
 use crate::geometry::PinholeCamera;
 use crate::workspace::{Arena, WorkspaceError};
@@ -7,8 +9,17 @@ use crate::workspace::{Arena, WorkspaceError};
 /// Half width of the window that a plane is fitted to, in pixels of the map.
 const WINDOW_RADIUS: usize = 2;
 
+/// Pixels of a side of the window.
+const WINDOW: usize = 2 * WINDOW_RADIUS + 1;
+
 /// Fewest measured pixels of the 5x5 window for a plane.
 const MIN_SUPPORT: f32 = 14.0;
+
+/// Least determinant of the second moments of those pixels: less is a line.
+const MIN_DETERMINANT: f32 = 1.0;
+
+/// Planes that are fitted at the same time.
+const LANES: usize = 8;
 
 /// Plane of inverse depth around every pixel of a map: `rho(u, v) = value + slope_u du + slope_v dv`.
 #[derive(Debug)]
@@ -46,14 +57,32 @@ impl<'m> SurfacePlanes<'m> {
     }
 
     /// Fits the planes of `map`, which has the same size.
-    pub fn fit(&mut self, map: &InverseDepthMap) {
-        for v in 0..self.height {
-            for u in 0..self.width {
-                let plane = fit_plane(map, u, v).unwrap_or_default();
-                let index = v * self.width + u;
-                self.value[index] = plane.value;
-                self.slope_u[index] = plane.slope_u;
-                self.slope_v[index] = plane.slope_v;
+    pub fn fit(&mut self, level: Level, map: &InverseDepthMap) {
+        dispatch!(level, simd => self.fit_rows(simd, map));
+    }
+
+    /// Eight planes at a time where their windows lie inside, one by one along the border.
+    #[inline(always)]
+    fn fit_rows<S: Simd>(&mut self, simd: S, map: &InverseDepthMap) {
+        let (width, height) = (self.width, self.height);
+        for v in 0..height {
+            let is_inside = v >= WINDOW_RADIUS && v + WINDOW_RADIUS < height;
+            let mut u = 0;
+            while u < width {
+                let index = v * width + u;
+                if is_inside && u >= WINDOW_RADIUS && u + LANES + WINDOW_RADIUS <= width {
+                    let [value, slope_u, slope_v] = fit_planes(simd, map, index);
+                    value.store_slice(&mut self.value[index..index + LANES]);
+                    slope_u.store_slice(&mut self.slope_u[index..index + LANES]);
+                    slope_v.store_slice(&mut self.slope_v[index..index + LANES]);
+                    u += LANES;
+                } else {
+                    let plane = fit_plane(map, u, v).unwrap_or_default();
+                    self.value[index] = plane.value;
+                    self.slope_u[index] = plane.slope_u;
+                    self.slope_v[index] = plane.slope_v;
+                    u += 1;
+                }
             }
         }
     }
@@ -85,6 +114,49 @@ struct Plane {
     value: f32,
     slope_u: f32,
     slope_v: f32,
+}
+
+/// [`fit_plane`] for the eight pixels from `index` on, all of whose windows lie inside; zero where there is no plane.
+///
+/// A lane is a pixel: 25 loads, and about nine operations for each. The sums are taken in the same order as for one plane.
+#[inline(always)]
+fn fit_planes<S: Simd>(simd: S, map: &InverseDepthMap, index: usize) -> [f32x8<S>; 3] {
+    let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+    let load = |at: usize| f32x8::from_slice(simd, &map.values[at..at + LANES]);
+    let centre = load(index);
+    // The limit is linear in the inverse depth.
+    let limit = centre * (spread_limit(1.0) - spread_limit(0.0)) + spread_limit(0.0);
+    let mut s = [zero; 6];
+    let mut t = [zero; 3];
+    for j in 0..WINDOW {
+        for i in 0..WINDOW {
+            let rho = load(index + j * map.width + i - WINDOW_RADIUS * (map.width + 1));
+            let difference = rho - centre;
+            let counts = rho.simd_gt(0.0) & difference.abs().simd_lt(limit);
+            let (count, difference) = (counts.select(one, zero), counts.select(difference, zero));
+            let (x, y) = (i as f32 - WINDOW_RADIUS as f32, j as f32 - WINDOW_RADIUS as f32);
+            for (sum, factor) in s.iter_mut().zip([1.0, x, y, x * x, x * y, y * y]) {
+                *sum += count * factor;
+            }
+            for (sum, factor) in t.iter_mut().zip([1.0, x, y]) {
+                *sum += difference * factor;
+            }
+        }
+    }
+    let has_support = s[0].simd_ge(MIN_SUPPORT) & centre.simd_gt(0.0);
+    let inverse_count = one / s[0].max(1.0);
+    let xx = s[3] - s[1] * s[1] * inverse_count;
+    let xy = s[4] - s[1] * s[2] * inverse_count;
+    let yy = s[5] - s[2] * s[2] * inverse_count;
+    let xt = t[1] - s[1] * t[0] * inverse_count;
+    let yt = t[2] - s[2] * t[0] * inverse_count;
+    let determinant = xx * yy - xy * xy;
+    let holds = has_support & determinant.simd_ge(MIN_DETERMINANT);
+    let determinant = determinant.max(MIN_DETERMINANT);
+    let slope_u = (yy * xt - xy * yt) / determinant;
+    let slope_v = (xx * yt - xy * xt) / determinant;
+    let value = (t[0] - slope_u * s[1] - slope_v * s[2]) * inverse_count;
+    [value + centre, slope_u, slope_v].map(|figure| holds.select(figure, zero))
 }
 
 /// Least-squares plane through the pixels of the window that lie on the surface of the centre pixel.
@@ -127,7 +199,7 @@ fn solve_plane(s: &[f32; 6], t: &[f32; 3]) -> Option<Plane> {
     );
     let (xt, yt) = (t[1] - s[1] * t[0] * inverse_count, t[2] - s[2] * t[0] * inverse_count);
     let determinant = xx * yy - xy * xy;
-    if determinant < 1.0 {
+    if determinant < MIN_DETERMINANT {
         return None;
     }
     let slope_u = (yy * xt - xy * yt) / determinant;
@@ -141,6 +213,7 @@ mod tests {
     use std::vec;
 
     use super::*;
+    use crate::simd::{level_name, levels_up_to};
 
     const CAMERA: PinholeCamera =
         PinholeCamera { width: 16, height: 12, fx: 15.0, fy: 15.0, cx: 7.5, cy: 5.5 };
@@ -153,7 +226,7 @@ mod tests {
             *value = rho(k % 16, k / 16);
         }
         let mut planes = SurfacePlanes::carve(&mut arena, &CAMERA, 0).expect("memory");
-        planes.fit(&map);
+        planes.fit(Level::new(), &map);
         (0..16 * 12).for_each(|k| check(k % 16, k / 16, &planes));
     }
 
@@ -186,6 +259,39 @@ mod tests {
                 assert!(planes.slope_v[v * 16 + u].abs() < 1e-6);
             }
         });
+    }
+
+    #[test]
+    fn every_instruction_set_fits_the_same_planes() {
+        const SIDE: usize = 40;
+        let camera = PinholeCamera { width: SIDE, height: SIDE, ..CAMERA };
+        let mut memory = vec![0; 4 * (SIDE * SIDE * 4 + 64) + 64];
+        let mut arena = Arena::new(&mut memory);
+        let map = InverseDepthMap::carve(&mut arena, &camera, 0).expect("memory");
+        for (k, value) in map.values.iter_mut().enumerate() {
+            let (u, v) = (k % SIDE, k / SIDE);
+            // Steps, slopes, roughness and holes.
+            let rough = 0.002 * ((7 * u + 13 * v) % 11) as f32;
+            *value = if (3 * u + 5 * v) % 9 < 3 {
+                0.0
+            } else {
+                0.3 + 0.2 * (u / 13) as f32 + 0.004 * v as f32 + rough
+            };
+        }
+        let mut planes = SurfacePlanes::carve(&mut arena, &camera, 0).expect("memory");
+        let mut fitted = 0;
+        for level in levels_up_to(Level::new()) {
+            planes.fit(level, &map);
+            for k in 0..SIDE * SIDE {
+                let expected = fit_plane(&map, k % SIDE, k / SIDE).unwrap_or_default();
+                let found = [planes.value[k], planes.slope_u[k], planes.slope_v[k]];
+                let expected = [expected.value, expected.slope_u, expected.slope_v];
+                let same = found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-6);
+                assert!(same, "{}, pixel {k}: {found:?}, not {expected:?}", level_name(level));
+                fitted += usize::from(found[0] > 0.0);
+            }
+        }
+        assert!(fitted > 500, "{fitted} planes");
     }
 
     #[test]

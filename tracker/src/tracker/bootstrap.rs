@@ -120,7 +120,7 @@ impl Tracker<'_> {
         mem::swap(&mut self.span, &mut self.keyframe_span);
         self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
         self.deblur.capture(keyframe.pyramid.levels[0].pixels);
-        keyframe.restart_surface();
+        keyframe.restart_surface(self.simd);
         self.set_keyframe_path(path);
     }
 }

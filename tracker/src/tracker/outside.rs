@@ -23,14 +23,14 @@ impl Tracker<'_> {
         }
         self.keep_keyframe();
         self.keyframe.pyramid.fill(&view.colour, &self.luminance);
-        self.keyframe.depth.fill(&view.depth, self.config.metres_per_unit);
+        self.keyframe.depth.fill(self.simd, &view.depth, self.config.metres_per_unit);
         self.keyframe.world_from_keyframe = view.world_from_camera;
         let still = ExposureTrajectory::still(RigidTransform::identity());
         self.keyframe.keyframe_from_camera = Some(BowedTrajectory::without_bow(still));
         self.keyframe.timing = FrameTiming::GLOBAL;
         self.keyframe.blur = 0.0;
         self.keyframe.frame_index = self.frames.saturating_sub(1);
-        self.keyframe.restart_surface();
+        self.keyframe.restart_surface(self.simd);
         self.select_keypoints();
         self.brightness = BrightnessModel::default();
         if self.motion.is_none() {

@@ -42,7 +42,7 @@ impl Tracker<'_> {
         self.keyframe.frame_index = self.frames;
         self.rectify.capture(self.keyframe.pyramid.levels[0].pixels, self.keyframe.depth.values);
         self.deblur.capture(self.keyframe.pyramid.levels[0].pixels);
-        self.keyframe.restart_surface();
+        self.keyframe.restart_surface(self.simd);
         self.brightness = BrightnessModel::default();
         let deblurred = self.sharpen_keyframe();
         if !deblurred {
@@ -73,7 +73,7 @@ impl Tracker<'_> {
                 keyframe.pyramid.levels[0].pixels,
                 &mut keyframe.depth,
             );
-            keyframe.restart_surface();
+            keyframe.restart_surface(self.simd);
         } else if !deblurred {
             return false;
         }
@@ -167,7 +167,7 @@ impl Tracker<'_> {
         self.keyframe.keyframe_from_camera = Some(path);
         self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
         self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
-        self.keyframe.refit_surface();
+        self.keyframe.refit_surface(self.simd);
         self.rectify.rectify_image(
             self.simd,
             &path,

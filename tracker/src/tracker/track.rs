@@ -161,7 +161,7 @@ impl<'m> Tracker<'m> {
         self.check(frame)?;
         self.work = Work { image_pixels: self.pixels(), ..Work::none() };
         self.pyramid.fill(&frame.colour, &self.luminance);
-        self.depth_share = self.depth.fill(&frame.depth, self.config.metres_per_unit);
+        self.depth_share = self.depth.fill(self.simd, &frame.depth, self.config.metres_per_unit);
         (self.timing, self.span) = self.config.readout.timing(frame);
         self.gyro = frame.gyro;
         let blind = self.pyramid.levels.last().is_some_and(|coarsest| is_blind(coarsest.pixels));
@@ -433,7 +433,7 @@ impl<'m> Tracker<'m> {
             self.correct_keyframe_path(&correction);
         } else if status == FrameStatus::Ok {
             let camera = self.config.camera.at_level(self.config.surface_level);
-            self.keyframe.fuse_depth(&self.depth, &outcome.estimate.path(), &self.timing, &camera);
+            self.keyframe.fuse_depth(self.simd, &self.depth, &outcome.estimate.path(), &self.timing, &camera);
         }
         result
     }

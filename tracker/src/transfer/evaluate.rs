@@ -1,5 +1,7 @@
 //! The photometric term of one pyramid level: robust cost and normal equations over all patches.
 
+use core::ops::Range;
+
 use bytemuck::{Pod, Zeroable};
 use fearless_simd::{Level, Simd, dispatch};
 use nalgebra::{SMatrix, SVector};
@@ -83,19 +85,34 @@ pub fn linearize(
     model: &ResidualModel,
     patches: &mut [PatchCost],
 ) -> PhotometricSums {
-    dispatch!(level, simd => sums_of_patches::<_, LINEAR_PATH, ROW_LENGTH>(simd, problem, sites, model, patches))
+    dispatch!(level, simd => sums_of_patches(simd, problem, sites, model, patches))
+}
+
+/// Parts of an image that are transferred one after the other, each with virtual views of its own; an iterator whose items
+/// may borrow from it.
+pub trait TransferParts {
+    /// The next part and the range of its sites; `None` after the last one.
+    fn next_part(&mut self) -> Option<(TransferProblem<'_>, Range<usize>)>;
+}
+
+/// A single part.
+impl TransferParts for Option<(TransferProblem<'_>, Range<usize>)> {
+    fn next_part(&mut self) -> Option<(TransferProblem<'_>, Range<usize>)> {
+        self.take()
+    }
 }
 
 /// Normal equations and robust cost of all patches by the parameters of a path with bow, for rows that are exposed one
-/// after the other; see [`evaluate_cost`]. The views are those of [`super::RowBand::views`].
+/// after the other; see [`evaluate_cost`]. The views of each part are those of [`super::RowBand::views`]. Patches of no part
+/// cost nothing.
 pub fn linearize_bowed(
     level: Level,
-    problem: &TransferProblem,
+    parts: &mut impl TransferParts,
     sites: &[PatchSite],
     model: &ResidualModel,
     patches: &mut [PatchCost],
 ) -> BowedSums {
-    dispatch!(level, simd => sums_of_patches::<_, BOWED_PATH, BOWED_ROW_LENGTH>(simd, problem, sites, model, patches))
+    dispatch!(level, simd => sums_of_parts(simd, parts, sites, model, patches))
 }
 
 /// Predicted intensities of every patch; `out` has the length of `sites`.
@@ -148,21 +165,44 @@ fn cost_of_patches<S: Simd, const ROLLING: bool>(
 }
 
 #[inline(always)]
-fn sums_of_patches<S: Simd, const PATH: usize, const ROW: usize>(
+fn sums_of_patches<S: Simd>(
     simd: S,
     problem: &TransferProblem,
     sites: &[PatchSite],
     model: &ResidualModel,
     patches: &mut [PatchCost],
-) -> RowSums<ROW> {
+) -> PhotometricSums {
     patches.fill(PatchCost::default());
     let Some(mut kernel) = TransferKernel::new(simd, problem) else { return RowSums::default() };
     let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
-    let mut rows = PatchRows::<PATH>::default();
+    let mut rows = PatchRows::<LINEAR_PATH>::default();
     let mut sums = NormalEquations::new(simd);
     for (site, patch) in sites.iter().zip(patches) {
         kernel.patch_rows(site, &mut rows);
         *patch = sums.add(&whitening, site, &rows);
+    }
+    sums.finish()
+}
+
+/// All parts share the accumulators, which take longer to clear and to sum up than a few patches.
+#[inline(always)]
+fn sums_of_parts<S: Simd>(
+    simd: S,
+    parts: &mut impl TransferParts,
+    sites: &[PatchSite],
+    model: &ResidualModel,
+    patches: &mut [PatchCost],
+) -> BowedSums {
+    patches.fill(PatchCost::default());
+    let mut rows = PatchRows::<BOWED_PATH>::default();
+    let mut sums = NormalEquations::new(simd);
+    while let Some((problem, part)) = parts.next_part() {
+        let Some(mut kernel) = TransferKernel::new(simd, &problem) else { continue };
+        let whitening = Whitening::new(simd, &problem.current, &problem.brightness, model);
+        for (site, patch) in sites[part.clone()].iter().zip(&mut patches[part]) {
+            kernel.patch_rows(site, &mut rows);
+            *patch = sums.add(&whitening, site, &rows);
+        }
     }
     sums.finish()
 }

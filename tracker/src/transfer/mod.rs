@@ -14,8 +14,8 @@ pub mod reference;
 mod virtual_view;
 
 pub use evaluate::{
-    BowedSums, PatchCost, PhotometricSums, ResidualModel, accumulate_rows, evaluate_cost, huber, linearize,
-    linearize_bowed, transfer_rows, transfer_values,
+    BowedSums, PatchCost, PhotometricSums, ResidualModel, TransferParts, accumulate_rows, evaluate_cost,
+    huber, linearize, linearize_bowed, transfer_rows, transfer_values,
 };
 pub use pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 pub use pixel::{TransferredPixel, transfer_pixel};

@@ -141,11 +141,27 @@ impl RowBand {
         camera: &PinholeCamera,
         inverse_depth: f64,
     ) -> ArrayVec<VirtualView, MAX_VIRTUAL_VIEWS> {
+        let mut views = ArrayVec::new();
+        self.fill_views(path, timing, count, camera, inverse_depth, &mut views);
+        views
+    }
+
+    /// Replaces `views` by those of [`Self::views`].
+    pub fn fill_views(
+        &self,
+        path: &BowedTrajectory,
+        timing: &FrameTiming,
+        count: usize,
+        camera: &PinholeCamera,
+        inverse_depth: f64,
+        views: &mut ArrayVec<VirtualView, MAX_VIRTUAL_VIEWS>,
+    ) {
         let count = count.clamp(1, MAX_VIRTUAL_VIEWS);
         let middle = timing.row_time(self.centre(), self.height);
         let row_step = timing.readout / self.height as f64;
         let time = |k: usize| middle + timing.exposure * (SampleRule::Midpoint.time(k, count) - 0.5);
-        (0..count).map(|k| VirtualView::of_row(path, time(k), camera, row_step, inverse_depth)).collect()
+        views.clear();
+        views.extend((0..count).map(|k| VirtualView::of_row(path, time(k), camera, row_step, inverse_depth)));
     }
 }
 

@@ -47,17 +47,28 @@ fn error(results: &[FrameResult], frames: &[RenderedFrame]) -> f64 {
     (results.iter().zip(frames).map(square).sum::<f64>() / frames.len() as f64).sqrt()
 }
 
+/// Where recordings begin, seconds. A single short one is at the mercy of its last frames.
+const STARTS: [f64; 2] = [0.0, 0.4];
+
 #[test]
 fn rows_and_late_depth_are_modelled() {
     let camera = camera_of_width(160);
-    let frames: Vec<_> = (0..16).map(|k| rolling_frame(&camera, k as f64 / 30.0)).collect();
     let known = Readout { colour: READOUT, depth_apart: true, ..Readout::GLOBAL };
-    let results = tracked(&frames, known);
-    assert!(results.iter().all(|result| result.status == FrameStatus::Ok));
-    let (modelled, ignored) = (error(&results, &frames), error(&tracked(&frames, Readout::GLOBAL), &frames));
+    let (mut modelled, mut ignored) = (0.0, 0.0);
+    for start in STARTS {
+        let frames: Vec<_> = (0..16).map(|k| rolling_frame(&camera, start + k as f64 / 30.0)).collect();
+        let results = tracked(&frames, known);
+        assert!(results.iter().all(|result| result.status == FrameStatus::Ok));
+        modelled += error(&results, &frames);
+        ignored += error(&tracked(&frames, Readout::GLOBAL), &frames);
+        motion_follows_from_rows(&results, &frames);
+    }
     assert!(modelled < 0.5 * ignored, "{modelled} m with, {ignored} m without the times of rows and depth");
-    // The exposure's motion follows from the rows: its direction is certain and its length good.
-    for (result, frame) in results.iter().zip(&frames).skip(2) {
+}
+
+/// The exposure's motion follows from the rows: its direction is certain and its length good.
+fn motion_follows_from_rows(results: &[FrameResult], frames: &[RenderedFrame]) {
+    for (result, frame) in results.iter().zip(frames).skip(2) {
         let (found, truth) = (result.world_from_camera.motion(), frame.truth.motion());
         let turn = |motion: &nalgebra::Vector6<f64>| motion.fixed_rows::<3>(3).into_owned();
         if turn(&truth).norm() > 0.003 {

@@ -18,6 +18,9 @@ const MIN_STRENGTH: f32 = 0.02;
 /// Blur in pixels from which a keyframe is deblurred, and up to which it is worth the try.
 const DEBLUR_RANGE: core::ops::Range<f32> = 1.0..40.0;
 
+/// Blur in pixels by which a keyframe's motion has to change for it to be deblurred anew.
+const DEBLUR_CHANGE: f32 = 0.8;
+
 /// Standard deviation of a keyframe's velocity and of one between mid poses, as a shear in pixels over the path of a frame.
 const KEYFRAME_SHEAR: f64 = 2.0;
 const MID_POSE_SHEAR: f64 = 0.3;
@@ -87,12 +90,19 @@ impl Tracker<'_> {
     /// Where rows were exposed one after the other the result is the picture that is given one time afterwards: blur lies
     /// along the motion of each row, and another path shears the same sharp picture.
     fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
-        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
-        if self.config.reference == ReferenceMode::Raw || !worth {
-            return false;
-        }
-        let Some(typical) = self.keyframe.depth.mean() else { return false };
         let timing = self.keyframe.timing;
+        self.deblurred_with = exposure_of(path, &timing).motion();
+        let sharp = if timing.is_rolling() {
+            self.rectify.image()
+        } else {
+            &mut *self.keyframe.pyramid.levels[0].pixels
+        };
+        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
+        let typical = self.keyframe.depth.mean().filter(|_| worth);
+        let Some(typical) = typical.filter(|_| self.config.reference == ReferenceMode::Deblurred) else {
+            self.deblur.restore(sharp);
+            return false;
+        };
         let longest = self.deblur.flow.fill(
             path,
             &timing,
@@ -101,11 +111,6 @@ impl Tracker<'_> {
             self.config.surface_level,
             typical,
         );
-        let sharp = if timing.is_rolling() {
-            self.rectify.image()
-        } else {
-            &mut *self.keyframe.pyramid.levels[0].pixels
-        };
         let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, sharp);
         self.work.blur_taps += report.taps;
         true
@@ -168,6 +173,10 @@ impl Tracker<'_> {
         self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
         self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
         self.keyframe.refit_surface(self.simd);
+        let change = exposure_of(&path, &self.keyframe.timing).motion() - self.deblurred_with;
+        if self.blur_length(&ExposureTrajectory::from_mid_and_motion(&mid, &change)) > DEBLUR_CHANGE {
+            self.deblur_keyframe(&path);
+        }
         self.rectify.rectify_image(
             self.simd,
             &path,

@@ -1,7 +1,7 @@
 //! The tracking loop.
 
 use fearless_simd::Level;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use super::coarse_to_fine::{Aligned, FrameTask, score};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
@@ -63,6 +63,8 @@ pub struct Tracker<'m> {
     pub(super) recent: RecentKeyframes<'m>,
     pub(super) scratch: AlignScratch<'m>,
     pub(super) deblur: DeblurScratch<'m>,
+    /// Motion during the exposure with which the keyframe was deblurred, or would have been.
+    pub(super) deblurred_with: Vector6<f64>,
     pub(super) rectify: RectifyScratch<'m>,
     /// When the parts of the current frame were measured, along a path of `span` seconds.
     pub(super) timing: FrameTiming,
@@ -125,6 +127,7 @@ impl<'m> Tracker<'m> {
                 ReferenceMode::Deblurred => DeblurScratch::carve(&mut arena, camera.width, camera.height)?,
                 ReferenceMode::Raw => DeblurScratch::carve(&mut arena, 0, 0)?,
             },
+            deblurred_with: Vector6::zeros(),
             rectify: RectifyScratch::carve(
                 &mut arena,
                 camera,

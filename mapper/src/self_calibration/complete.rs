@@ -4,7 +4,7 @@ use mba_tracker::geometry::PinholeCamera;
 
 use super::depth_time::{self, Measured};
 use super::exposure::PixelScale;
-use super::exposure_times::{ExposureSearch, ExposureTimes, SHORTEST};
+use super::exposure_times::{ExposureSearch, ExposureTimes, Exposures, SHORTEST};
 use super::finding::{Finding, Value};
 use super::readout::{ReadoutSearch, depth_readout};
 use super::robust::median;
@@ -65,8 +65,7 @@ pub fn complete(dataset: Dataset) -> Result<(Dataset, Vec<Finding>), DatasetErro
 
 /// What is known after the search.
 struct Estimates {
-    /// None without motion.
-    exposures: Option<ExposureTimes>,
+    exposures: Exposures,
     readout: Option<Measured>,
     /// Time from the first row of depth to the last, seconds; none where it is on record or nothing tells.
     depth_readout: Option<f64>,
@@ -85,7 +84,7 @@ impl Estimates {
         let calibration = dataset.calibration();
         let (exposure_known, readout_known) = (is_exposure_known(calibration), is_readout_known(calibration));
         let mut found = Self {
-            exposures: None,
+            exposures: Exposures::NoMotion,
             readout: None,
             depth_readout: None,
             depth_delay: None,
@@ -172,11 +171,11 @@ impl Estimates {
             calibration.depth_clock_seconds = found.seconds;
             calibration.sources.depth_delay = Knowledge::Estimated;
         }
-        if !exposure_known && self.exposures.is_none() {
+        if !exposure_known && self.exposures == Exposures::NoMotion {
             calibration.exposure = ExposureSource::Assumed { seconds: SHORTEST };
         }
         let mut dataset = dataset.with_calibration(calibration)?;
-        if let Some(found) = &self.exposures {
+        if let Exposures::Told(found) = &self.exposures {
             dataset.set_exposures(found.seconds.clone())?;
         }
         Ok(dataset)
@@ -185,7 +184,7 @@ impl Estimates {
     fn findings(&self, dataset: &Dataset) -> Vec<Finding> {
         let mut findings = Vec::new();
         if !is_exposure_known(dataset.calibration()) {
-            findings.push(self.exposure_finding());
+            findings.push(self.exposure_finding(dataset));
         }
         if self.readout_was_sought {
             findings.push(self.readout_finding(dataset.calibration()));
@@ -195,14 +194,20 @@ impl Estimates {
         findings
     }
 
-    fn exposure_finding(&self) -> Finding {
-        let Some(ExposureTimes { seconds, relative_sigma }) = &self.exposures else {
-            return Finding {
-                fact: "exposure",
-                knowledge: Knowledge::Assumed,
-                value: None,
-                note: "too little motion to tell; every frame is taken for sharp".into(),
-            };
+    fn exposure_finding(&self, dataset: &Dataset) -> Finding {
+        let unknown =
+            |note: String| Finding { fact: "exposure", knowledge: Knowledge::Assumed, value: None, note };
+        let ExposureTimes { seconds, relative_sigma } = match &self.exposures {
+            Exposures::Told(times) => times,
+            Exposures::Untold => {
+                let assumed = 1e3 * dataset.exposure_seconds(0);
+                return unknown(format!(
+                    "the rows tell the motion, whatever their exposure; {assumed:.1} ms are assumed"
+                ));
+            }
+            Exposures::NoMotion => {
+                return unknown("too little motion to tell; every frame is taken for sharp".into());
+            }
         };
         let middle = median(seconds).unwrap_or(SHORTEST);
         let (least, most) = seconds.iter().fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));

@@ -25,9 +25,6 @@ const FINE_ROUNDS: usize = 3;
 const TELLING_STEP: f64 = 0.05;
 const MIN_TAKEN_BACK: f64 = 0.2;
 
-/// Relative standard deviation of exposure times that motion does not tell.
-const UNTOLD: f64 = 0.5;
-
 /// Rounds after which the power of a response agrees with the motion, and the change that is no more than noise.
 const POWER_ROUNDS: usize = 2;
 const SAME_POWER: f64 = 0.05;
@@ -46,6 +43,17 @@ pub(super) struct ExposureTimes {
     pub(super) seconds: Vec<f64>,
     /// The relative standard deviation that they share.
     pub(super) relative_sigma: f64,
+}
+
+/// What the motion says about exposure times.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Exposures {
+    /// Too little motion to look at.
+    NoMotion,
+    /// The motion does not depend on them: rows tell it, whatever their exposure.
+    Untold,
+    /// They were found.
+    Told(ExposureTimes),
 }
 
 /// Where the search for exposure times ended.
@@ -76,17 +84,20 @@ impl ExposureSearch<'_> {
 
     /// Exposure times of all frames from those that coarse pictures tell, which is nearly all of it: a lens that is soft over
     /// a pixel or two makes the last few percent.
-    pub(super) fn fine(&self, guess: Guess) -> Option<ExposureTimes> {
+    pub(super) fn fine(&self, guess: Guess) -> Exposures {
         let (fine, power) = self.follow_response(self.window.probe(Resolution::Fine, guess));
-        let Settled { probe: Probe { guess, tracked }, is_told } = self.settle(Resolution::Fine, fine)?;
+        let Some(settled) = self.settle(Resolution::Fine, fine) else { return Exposures::NoMotion };
+        let Settled { probe: Probe { guess, tracked }, is_told } = settled;
+        if !is_told {
+            return Exposures::Untold;
+        }
         let brightness = if self.window.is_whole() {
             follow_brightness(&tracked, &guess)
         } else {
             follow_brightness(&self.window.recording.track_everything(&guess), &guess)
         };
-        let found = self.judged(&guess, &tracked, raised(&brightness, power))?;
-        let relative_sigma = if is_told { found.relative_sigma } else { UNTOLD };
-        Some(ExposureTimes { relative_sigma, ..found })
+        self.judged(&guess, &tracked, raised(&brightness, power))
+            .map_or(Exposures::NoMotion, Exposures::Told)
     }
 
     /// Exposure times by brightness, unless one time for all fits the motion better.

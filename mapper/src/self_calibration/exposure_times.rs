@@ -96,8 +96,7 @@ impl ExposureSearch<'_> {
         } else {
             follow_brightness(&self.window.recording.track_everything(&guess), &guess)
         };
-        self.judged(&guess, &tracked, raised(&brightness, power))
-            .map_or(Exposures::NoMotion, Exposures::Told)
+        self.judged(&guess, &tracked, raised(&brightness, power)).map_or(Exposures::NoMotion, Exposures::Told)
     }
 
     /// Exposure times by brightness, unless one time for all fits the motion better.

@@ -7,6 +7,7 @@ use nalgebra::Vector6;
 use super::coarse_to_fine::Aligned;
 use super::frame::Frame;
 use super::history::Motion;
+use super::reference::Sharpness;
 use super::result::{FrameStatus, Revision};
 use super::track::{Tracker, exposure_of};
 use crate::align::Estimate;
@@ -33,7 +34,9 @@ impl Tracker<'_> {
         let dt = frame.timestamp - motion.timestamp;
         let mid = first.outcome.estimate.keyframe_from_camera.mid();
         let rate = RigidTransform::identity().tangent_to(&mid) / dt;
-        self.set_keyframe_path(self.path_of_keyframe(&rate, &Vector6::zeros()));
+        // Where rows or depth have other times both frames are given better paths below.
+        let sharpness = if timing.reaches_outside() { Sharpness::AsCaptured } else { Sharpness::Deblurred };
+        self.set_keyframe_path(self.path_of_keyframe(&rate, &Vector6::zeros()), sharpness);
         let mut second = self.align(frame, motion, self.config.align.blur, Some(mid));
         let refined = self.rate_before(&second.outcome.estimate, dt);
         let mut path = self.path_of_keyframe(&refined, &Vector6::zeros());
@@ -81,10 +84,13 @@ impl Tracker<'_> {
         let mut of_frame = first;
         let mut of_keyframe =
             BowedTrajectory::without_bow(ExposureTrajectory::still(RigidTransform::identity()));
-        for _ in 0..BOOTSTRAP_ROUNDS {
+        for round in 1..=BOOTSTRAP_ROUNDS {
+            let sharpness =
+                if round == BOOTSTRAP_ROUNDS { Sharpness::Deblurred } else { Sharpness::AsCaptured };
             let keyframe_from_mid = of_frame.outcome.estimate.keyframe_from_camera.mid();
             let mid_from_keyframe = keyframe_from_mid.inverse();
-            self.exchange_with_keyframe(of_frame.outcome.estimate.path().seen_from(&mid_from_keyframe));
+            let path = of_frame.outcome.estimate.path().seen_from(&mid_from_keyframe);
+            self.exchange_with_keyframe(path, sharpness);
             let back = Frame {
                 timestamp: motion.timestamp,
                 angular_velocity: None,
@@ -100,7 +106,7 @@ impl Tracker<'_> {
             let frame_from_keyframe = reverse.outcome.estimate.path();
             of_keyframe = frame_from_keyframe.seen_from(&frame_from_keyframe.linear.mid().inverse());
             self.keyframe.world_from_keyframe = world_from_keyframe;
-            self.exchange_with_keyframe(of_keyframe);
+            self.exchange_with_keyframe(of_keyframe, sharpness);
             let start = frame_from_keyframe.linear.mid().inverse();
             of_frame = self.align(frame, motion, self.config.align.blur, Some(start));
         }
@@ -109,7 +115,7 @@ impl Tracker<'_> {
 
     /// Makes the current frame, which moved along `path` seen from its own mid pose, the keyframe, and the keyframe as it
     /// was captured the current frame.
-    pub(super) fn exchange_with_keyframe(&mut self, path: BowedTrajectory) {
+    fn exchange_with_keyframe(&mut self, path: BowedTrajectory, sharpness: Sharpness) {
         let keyframe = &mut self.keyframe;
         self.rectify.restore(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
         self.deblur.restore(keyframe.pyramid.levels[0].pixels);
@@ -121,6 +127,6 @@ impl Tracker<'_> {
         self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
         self.deblur.capture(keyframe.pyramid.levels[0].pixels);
         keyframe.restart_surface(self.simd);
-        self.set_keyframe_path(path);
+        self.set_keyframe_path(path, sharpness);
     }
 }

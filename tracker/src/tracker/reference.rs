@@ -25,6 +25,15 @@ const DEBLUR_CHANGE: f32 = 0.8;
 const KEYFRAME_SHEAR: f64 = 2.0;
 const MID_POSE_SHEAR: f64 = 0.3;
 
+/// What is done to a keyframe whose path is known.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sharpness {
+    /// It is given one time and deblurred, where either is worth it.
+    Deblurred,
+    /// It is only given one time: for paths that are soon replaced by better ones.
+    AsCaptured,
+}
+
 impl Tracker<'_> {
     /// Makes the current frame the keyframe.
     pub(super) fn promote(
@@ -47,25 +56,25 @@ impl Tracker<'_> {
         self.deblur.capture(self.keyframe.pyramid.levels[0].pixels);
         self.keyframe.restart_surface(self.simd);
         self.brightness = BrightnessModel::default();
-        let deblurred = self.sharpen_keyframe();
+        let deblurred = self.sharpen_keyframe(Sharpness::Deblurred);
         if !deblurred {
             self.select_keypoints();
         }
     }
 
-    pub(super) fn set_keyframe_path(&mut self, path: BowedTrajectory) {
+    pub(super) fn set_keyframe_path(&mut self, path: BowedTrajectory, sharpness: Sharpness) {
         self.keyframe.keyframe_from_camera = Some(path);
         self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
-        self.sharpen_keyframe();
+        self.sharpen_keyframe(sharpness);
     }
 
     /// Deblurs the keyframe as it was captured, gives it one time, with its own motion, and selects its keypoints; `false`
     /// if there is nothing to do.
-    pub(super) fn sharpen_keyframe(&mut self) -> bool {
+    fn sharpen_keyframe(&mut self, sharpness: Sharpness) -> bool {
         self.work.image_pixels += self.pixels();
         let Some(path) = self.keyframe.keyframe_from_camera else { return false };
         let timing = self.keyframe.timing;
-        let deblurred = self.deblur_keyframe(&path);
+        let deblurred = sharpness == Sharpness::Deblurred && self.deblur_keyframe(&path);
         if timing.reaches_outside() {
             let keyframe = &mut self.keyframe;
             self.rectify.rectify(

@@ -19,9 +19,9 @@ const MIN_FRAMES: usize = 5;
 const MIN_LOG_STEP: f64 = 0.1;
 const MIN_SLOPES: usize = 20;
 
-/// Powers between an assumed and a usual response, and how far two halves of the frames may differ.
+/// Powers between an assumed and a usual response, and their standard deviation around 1.
 const POWERS: std::ops::RangeInclusive<f64> = 0.5..=2.0;
-const MAX_CONTRADICTION: f64 = 0.5;
+const POWER_SIGMA: f64 = 0.4;
 
 /// Turns motions (translation in metres, rotation in radians) into pixels at a typical depth.
 #[derive(Clone, Copy, Debug)]
@@ -68,8 +68,9 @@ pub(super) fn factor(observations: &[(usize, f64, f64)], exposures: &[f64]) -> O
 /// The power of `exposures` that the motion follows, where their ratios come from brightness through an assumed response.
 /// A response is known up to a power as long as no exposure times are; motion tells them.
 ///
-/// The median of the slopes between all pairs of frames on logarithmic axes, after Theil and Sen. None where exposures
-/// hardly vary, or where one half of the frames contradicts the other.
+/// The median of the slopes between all pairs of frames on logarithmic axes, after Theil and Sen, drawn towards 1 as far as
+/// the two halves of the frames contradict each other. None where exposures hardly vary, or for a power that no response
+/// has.
 pub(super) fn power(observations: &[(usize, f64, f64)], exposures: &[f64]) -> Option<f64> {
     let point = |(index, seconds, _): &(usize, f64, f64)| (exposures[*index].ln(), seconds.max(1e-4).ln());
     let points: Vec<(f64, f64)> = observations.iter().map(point).collect();
@@ -84,8 +85,10 @@ pub(super) fn power(observations: &[(usize, f64, f64)], exposures: &[f64]) -> Op
     let half = |which: usize| points.iter().skip(which).step_by(2).copied().collect::<Vec<_>>();
     let (even, odd) = (slope(&half(0))?, slope(&half(1))?);
     let found = slope(&points)?;
-    let is_certain = POWERS.contains(&found) && (even - odd).abs() < MAX_CONTRADICTION;
-    is_certain.then_some(found)
+    // Each half is off by sqrt(2) times as much as the whole, their difference by twice as much.
+    let variance = 0.25 * (even - odd) * (even - odd);
+    let share = POWER_SIGMA * POWER_SIGMA / (POWER_SIGMA * POWER_SIGMA + variance);
+    POWERS.contains(&found).then_some(1.0 + share * (found - 1.0))
 }
 
 #[cfg(test)]

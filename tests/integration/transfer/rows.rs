@@ -2,7 +2,7 @@
 //! differences, and a band of the whole image with rows at the same time against the plain kernel.
 
 use mba_tests::transfer_scene::TransferScene;
-use mba_tracker::geometry::{RigidTransform, so3};
+use mba_tracker::geometry::{PinholeCamera, RigidTransform, so3};
 use mba_tracker::simd::{Level, level_name, levels_up_to};
 use mba_tracker::trajectory::{BowedTrajectory, FrameTiming};
 use mba_tracker::transfer::{
@@ -44,6 +44,17 @@ fn problem<'a>(scene: &'a TransferScene, views: &'a [VirtualView], band: RowBand
     TransferProblem { rows: RowTimes { centre: band.centre() as f32, step }, ..scene.problem_with(views) }
 }
 
+fn views_of_band(
+    band: &RowBand,
+    path: &BowedTrajectory,
+    timing: &FrameTiming,
+    camera: &PinholeCamera,
+) -> Vec<VirtualView> {
+    let mut views = Default::default();
+    band.fill_views(path, timing, VIEWS, camera, INVERSE_DEPTH, &mut views);
+    views.to_vec()
+}
+
 fn bowed_sums(
     level: Level,
     problem: TransferProblem,
@@ -61,9 +72,8 @@ fn gradient_errors(level: Level, seed: u64, sites: usize, (index, bands): (usize
     let (w, h) = (scene.camera.width, scene.camera.height);
     let band = RowBand::new(index, bands, h);
     let timing = FrameTiming { bands, ..timing() };
-    let views_of = |path: &BowedTrajectory, scene: &TransferScene| {
-        band.views(path, &timing, VIEWS, &scene.camera, INVERSE_DEPTH).to_vec()
-    };
+    let views_of =
+        |path: &BowedTrajectory, scene: &TransferScene| views_of_band(&band, path, &timing, &scene.camera);
     scene.sites.retain(|site| {
         let in_band = (band.first..band.end).contains(&(site.v.max(0) as usize));
         in_band && site.u > 60 && site.u < w as i16 - 60
@@ -121,7 +131,7 @@ fn rows_at_the_same_time_are_those_of_the_plain_kernel() {
     let still = FrameTiming::GLOBAL;
     let straight = BowedTrajectory::without_bow(scene.exposure);
     let band = RowBand::whole(scene.camera.height);
-    let views = band.views(&straight, &still, VIEWS, &scene.camera, INVERSE_DEPTH).to_vec();
+    let views = views_of_band(&band, &straight, &still, &scene.camera);
     let mut patches = vec![PatchCost::default(); scene.sites.len()];
     let plain = linearize(level, &scene.problem(), &scene.sites, &model, &mut patches);
     let bowed = bowed_sums(level, scene.problem_with(&views), &scene.sites, &mut patches);

@@ -94,7 +94,8 @@ impl Tracker<'_> {
         true
     }
 
-    /// Deblurs the keyframe, whose surface is as it was captured, with its path; `false` if it is not worth it.
+    /// Deblurs the keyframe as it was captured with its path; `false` if it is not worth it. Its surface may have been moved
+    /// to the middle of the path already: over a frame that changes the blur by a share of itself.
     ///
     /// Where rows were exposed one after the other the result is the picture that is given one time afterwards: blur lies
     /// along the motion of each row, and another path shears the same sharp picture.

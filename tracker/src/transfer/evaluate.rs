@@ -103,7 +103,7 @@ impl TransferParts for Option<(TransferProblem<'_>, Range<usize>)> {
 }
 
 /// Normal equations and robust cost of all patches by the parameters of a path with bow, for rows that are exposed one
-/// after the other; see [`evaluate_cost`]. The views of each part are those of [`super::RowBand::views`]. Patches of no part
+/// after the other; see [`evaluate_cost`]. The views of each part are those of [`super::RowBand::fill_views`]. Patches of no part
 /// cost nothing.
 pub fn linearize_bowed(
     level: Level,

@@ -130,23 +130,9 @@ impl RowBand {
         0.5 * (self.first + self.end) as f64 - 0.5
     }
 
-    /// The `count` virtual views of the middle row of the band for a frame that is exposed as `timing` says; at most
-    /// [`MAX_VIRTUAL_VIEWS`] are made.
-    #[must_use]
-    pub fn views(
-        &self,
-        path: &BowedTrajectory,
-        timing: &FrameTiming,
-        count: usize,
-        camera: &PinholeCamera,
-        inverse_depth: f64,
-    ) -> ArrayVec<VirtualView, MAX_VIRTUAL_VIEWS> {
-        let mut views = ArrayVec::new();
-        self.fill_views(path, timing, count, camera, inverse_depth, &mut views);
-        views
-    }
-
-    /// Replaces `views` by those of [`Self::views`].
+    /// Replaces `views`, which is large and stays where it is, by the `count` virtual views of the middle row of the band for
+    /// a frame that is exposed as `timing` says; at most [`MAX_VIRTUAL_VIEWS`] are made. `inverse_depth` is typical of the
+    /// scene, 1/m.
     pub fn fill_views(
         &self,
         path: &BowedTrajectory,

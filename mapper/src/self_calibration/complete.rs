@@ -100,7 +100,10 @@ impl Estimates {
         let guess = Guess::of(dataset);
         let recording = Recording { dataset, options: &options };
         let (window, mut probe) = recording.liveliest(guess);
-        probe = found.look_at_edges(&window, probe);
+        let seen = found.look_at_edges(&window, &probe);
+        if seen != probe.guess {
+            probe = window.probe(Resolution::Coarse, seen);
+        }
         let scale = PixelScale::new(&calibration.camera, depth);
         if !readout_known && found.readout.is_none() {
             probe = found.find_readout(&window, scale, probe);
@@ -109,20 +112,20 @@ impl Estimates {
         let settled = if exposure_known { None } else { search.coarse(probe.clone()) };
         let exposures_are_told = settled.is_some();
         // The second look knows the motion better.
-        probe = found.look_at_edges(&window, settled.unwrap_or(probe));
+        let guess = found.look_at_edges(&window, &settled.unwrap_or(probe));
         if exposures_are_told {
-            found.exposures = search.fine(probe.guess);
+            found.exposures = search.fine(guess);
         }
         found
     }
 
-    /// What the edges of colour and depth tell. Returns the probe with it, tracked again if it changed.
-    fn look_at_edges(&mut self, window: &Window<'_>, probe: Probe) -> Probe {
+    /// What the edges of colour and depth tell. Returns the guess with it.
+    fn look_at_edges(&mut self, window: &Window<'_>, probe: &Probe) -> Guess {
         let calibration = window.recording.dataset.calibration();
-        let Some(edges) = depth_time::find(window, &probe.tracked) else { return probe };
+        let mut guess = probe.guess.clone();
+        let Some(edges) = depth_time::find(window, &probe.tracked) else { return guess };
         self.depth_shift = Some(edges.shift);
         self.longer_than_depth = Some(edges.rows);
-        let mut guess = probe.guess.clone();
         if calibration.sources.depth_delay == Knowledge::Assumed && edges.delay.differs_from_none() {
             self.depth_delay = Some(edges.delay);
             guess.depth_delay = edges.delay.seconds;
@@ -137,7 +140,7 @@ impl Estimates {
             self.readout = Some(Measured { seconds: guess.readout, sigma });
             self.depth_readout = None;
         }
-        if guess == probe.guess { probe } else { window.probe(Resolution::Coarse, guess) }
+        guess
     }
 
     /// The readout that motion tells where the edges do not. Returns the probe with it, tracked again if it changed.

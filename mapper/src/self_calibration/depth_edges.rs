@@ -21,14 +21,31 @@ const MIN_JUMP: f64 = 0.08;
 /// Gradients above this, in steps of 8 bits, count no more than this: one strong edge is not worth many.
 const STRONGEST: f32 = 60.0;
 
-/// A jump of depth.
-#[derive(Clone, Copy, Debug)]
-struct EdgePoint {
-    /// Pixel of the depth map, in the middle of the jump.
-    place: [f64; 2],
+/// Steps in which a strength is kept, per step of 8 bits: the strongest still fits a byte.
+const STRENGTH_STEPS: f32 = 4.0;
+
+/// Jumps whose places are found together.
+const LANES: usize = 16;
+
+/// Jumps of depth, figure by figure, so that many are moved at a time. A picture's place is known to a few thousandths of a
+/// pixel in single precision.
+#[derive(Clone, Debug, Default)]
+struct Jumps {
+    /// Pixel of the depth map, in the middle of the jump: columns, rows.
+    place: [Vec<f32>; 2],
     /// How the near side moves in the picture: pixels per second, and per square of a second.
-    velocity: [f64; 2],
-    acceleration: [f64; 2],
+    velocity: [Vec<f32>; 2],
+    acceleration: [Vec<f32>; 2],
+}
+
+impl Jumps {
+    fn figures(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        self.place.iter_mut().chain(&mut self.velocity).chain(&mut self.acceleration)
+    }
+
+    fn push(&mut self, figures: [[f64; 2]; 3]) {
+        self.figures().zip(figures.as_flattened()).for_each(|(all, one)| all.push(*one as f32));
+    }
 }
 
 /// Jumps of depth in a frame and the strength of its picture's edges.
@@ -36,9 +53,10 @@ struct EdgePoint {
 pub(super) struct EdgeFrame {
     width: usize,
     height: usize,
-    /// Smoothed magnitude of the brightness gradient of every pixel.
-    gradient: Arc<[f32]>,
-    points: Vec<EdgePoint>,
+    /// Smoothed magnitude of the brightness gradient of every pixel, in [`STRENGTH_STEPS`]. In bytes a frame stays in the
+    /// cache while it is looked at.
+    gradient: Arc<[u8]>,
+    jumps: Jumps,
     /// Timestamp of depth minus that of colour, seconds.
     stamp: f64,
 }
@@ -78,82 +96,103 @@ impl EdgeFrame {
             let moved = -Vector3::from(motion.fixed_rows::<3>(3)).cross(ray) - shift * inverse_depth;
             [camera.fx * (moved.x - ray.x * moved.z), camera.fy * (moved.y - ray.y * moved.z)]
         };
-        let point = |(place, raw): ([f64; 2], u16)| {
+        let mut found = Jumps::default();
+        for (place, raw) in jumps(image) {
             let (ray, inverse_depth) = (camera.ray(place[0], place[1]), depth_scale / f64::from(raw));
-            EdgePoint {
-                place,
-                velocity: flow(&motion.velocity, &ray, inverse_depth),
-                acceleration: flow(&motion.acceleration, &ray, inverse_depth),
-            }
-        };
+            let flows = [motion.velocity, motion.acceleration].map(|motion| flow(&motion, &ray, inverse_depth));
+            found.push([place, flows[0], flows[1]]);
+        }
         Some(Self {
             width: image.width,
             height: image.height,
             gradient: gradient(image).into(),
-            points: jumps(image).into_iter().map(point).collect(),
+            jumps: found,
             stamp: image.depth_timestamp - image.timestamp,
         })
     }
 
     /// Number of jumps.
     pub(super) fn len(&self) -> usize {
-        self.points.len()
+        self.jumps.place[0].len()
     }
 
     /// Of the jumps, pixels per second.
     pub(super) fn sum_of_squared_speeds(&self) -> f64 {
-        let square = |point: &EdgePoint| point.velocity[0].powi(2) + point.velocity[1].powi(2);
-        self.points.iter().map(square).sum()
+        self.jumps.velocity.iter().flatten().map(|speed| f64::from(speed * speed)).sum()
     }
 
     /// Keeps every `step`-th jump.
     pub(super) fn thin_out(&mut self, step: usize) {
-        self.points = self.points.iter().step_by(step).copied().collect();
+        self.jumps.figures().for_each(|all| *all = all.iter().step_by(step).copied().collect());
     }
 
     /// Sum of the strengths of the picture's edges where the jumps of depth should lie, and of how many that is. Those that
     /// leave the picture do not count.
     pub(super) fn strength(&self, supposed: &Supposition) -> (f64, usize) {
         let (mut sum, mut count) = (0.0, 0);
-        for point in &self.points {
-            if let Some(strength) = self.sample(self.place_in_colour(point, supposed)) {
-                sum += f64::from(strength);
-                count += 1;
+        for start in (0..self.len()).step_by(LANES) {
+            let lanes = LANES.min(self.len() - start);
+            let [u, v] = self.places_in_colour(start, lanes, supposed);
+            for (u, v) in u.into_iter().zip(v).take(lanes) {
+                if let Some(strength) = self.sample(u, v) {
+                    sum += f64::from(strength);
+                    count += 1;
+                }
             }
         }
-        (sum, count)
+        (sum / f64::from(STRENGTH_STEPS), count)
     }
 
-    /// Where a jump of depth should lie in the picture, pixels.
-    fn place_in_colour(&self, point: &EdgePoint, supposed: &Supposition) -> [f64; 2] {
-        let height = self.height as f64;
-        let size = [self.width as f64, height];
-        // Both times count from the timestamp of colour. Only the difference of the rows' times is supposed.
-        let time_of_depth = self.stamp + supposed.delay;
-        let way = |axis: usize, time: f64| {
-            point.velocity[axis] * time + 0.5 * point.acceleration[axis] * time * time
+    /// Where `lanes` jumps of depth from number `start` on should lie in the picture: columns and rows, pixels.
+    ///
+    /// Plain loops over arrays of a known length become vector instructions.
+    fn places_in_colour(&self, start: usize, lanes: usize, supposed: &Supposition) -> [[f32; LANES]; 2] {
+        let load = |all: &[Vec<f32>; 2]| {
+            [0, 1].map(|axis| {
+                let mut loaded = [0.0; LANES];
+                loaded[..lanes].copy_from_slice(&all[axis][start..start + lanes]);
+                loaded
+            })
         };
-        let moved =
-            |time: f64| [0, 1].map(|axis| point.place[axis] + way(axis, time) - way(axis, time_of_depth));
-        // The row decides the time and the time the row; a second look is enough.
-        let time_of_row = |row: f64| supposed.rows * ((row + 0.5) / height - 0.5);
-        let near = moved(time_of_row(point.place[1]));
-        let place = moved(time_of_row(near[1]));
-        [0, 1].map(|axis| {
-            place[axis] + supposed.shift[axis] + supposed.zoom * (point.place[axis] + 0.5 - 0.5 * size[axis])
-        })
+        let (place, velocity) = (load(&self.jumps.place), load(&self.jumps.velocity));
+        let acceleration = load(&self.jumps.acceleration);
+        let size = [self.width as f32, self.height as f32];
+        // Both times count from the timestamp of colour. Only the difference of the rows' times is supposed.
+        let time_of_depth = (self.stamp + supposed.delay) as f32;
+        let (rows, zoom) = (supposed.rows as f32, supposed.zoom as f32);
+        let moved = |axis: usize, lane: usize, time: f32| {
+            let (sum, difference) = (time + time_of_depth, time - time_of_depth);
+            place[axis][lane]
+                + difference * (velocity[axis][lane] + 0.5 * sum * acceleration[axis][lane])
+        };
+        let time_of_row = |row: f32| rows * ((row + 0.5) / size[1] - 0.5);
+        let mut places = [[0.0; LANES]; 2];
+        for lane in 0..LANES {
+            // The row decides the time and the time the row; a second look is enough.
+            let near = moved(1, lane, time_of_row(place[1][lane]));
+            let time = time_of_row(near);
+            for axis in 0..2 {
+                let from_middle = place[axis][lane] + 0.5 - 0.5 * size[axis];
+                places[axis][lane] =
+                    moved(axis, lane, time) + supposed.shift[axis] as f32 + zoom * from_middle;
+            }
+        }
+        places
     }
 
-    /// Bilinear value of the gradient; none outside of the picture.
-    fn sample(&self, [u, v]: [f64; 2]) -> Option<f32> {
-        let inside = |x: f64, size: usize| x >= 0.0 && x < (size - 1) as f64;
+    /// Bilinear value of the gradient, in [`STRENGTH_STEPS`]; none outside of the picture.
+    fn sample(&self, u: f32, v: f32) -> Option<f32> {
+        let inside = |x: f32, size: usize| x >= 0.0 && x < (size - 1) as f32;
         if !inside(u, self.width) || !inside(v, self.height) {
             return None;
         }
-        let (column, row) = (u as usize, v as usize);
-        let (a, b) = ((u - column as f64) as f32, (v - row as f64) as f32);
-        let at = row * self.width + column;
-        let pair = |at: usize| self.gradient[at] + a * (self.gradient[at + 1] - self.gradient[at]);
+        let (column, row) = (u as u32, v as u32);
+        let (a, b) = (u - column as f32, v - row as f32);
+        let at = row as usize * self.width + column as usize;
+        let pair = |at: usize| {
+            let [left, right] = [self.gradient[at], self.gradient[at + 1]].map(f32::from);
+            left + a * (right - left)
+        };
         let (upper, lower) = (pair(at), pair(at + self.width));
         Some(upper + b * (lower - upper))
     }
@@ -183,9 +222,9 @@ fn jumps(image: &RgbdFrame) -> Vec<([f64; 2], u16)> {
     found
 }
 
-/// Magnitude of the gradient of the green channel, no more than [`STRONGEST`], smoothed by (1 2 1)/4 along both axes. 0 on
-/// the border.
-fn gradient(image: &RgbdFrame) -> Vec<f32> {
+/// Magnitude of the gradient of the green channel, no more than [`STRONGEST`], smoothed by (1 2 1)/4 along both axes, in
+/// [`STRENGTH_STEPS`]. 0 on the border.
+fn gradient(image: &RgbdFrame) -> Vec<u8> {
     let (width, height) = (image.width, image.height);
     let green = |at: usize| f32::from(image.rgb[3 * at + 1]);
     let strength = |at: usize| {
@@ -204,5 +243,6 @@ fn gradient(image: &RgbdFrame) -> Vec<f32> {
         }
         out
     };
-    smoothed(&smoothed(&magnitude, 1), width)
+    let whole = smoothed(&smoothed(&magnitude, 1), width);
+    whole.into_iter().map(|strength| (STRENGTH_STEPS * strength).round() as u8).collect()
 }

@@ -112,9 +112,10 @@ impl Estimates {
         let settled = if exposure_known { None } else { search.coarse(probe.clone()) };
         let exposures_are_told = settled.is_some();
         // The second look knows the motion better.
-        let guess = found.look_at_edges(&window, &settled.unwrap_or(probe));
+        probe = settled.unwrap_or(probe);
+        probe.guess = found.look_at_edges(&window, &probe);
         if exposures_are_told {
-            found.exposures = search.fine(guess);
+            found.exposures = search.fine(probe);
         }
         found
     }

@@ -20,6 +20,10 @@ const SETTLED: f64 = 0.01;
 const COARSE_ROUNDS: usize = 1;
 const FINE_ROUNDS: usize = 3;
 
+/// A shorter last step (of the logarithm) is taken without another look at where it leads: a third of it may be missing,
+/// which is less than [`SYSTEMATIC`].
+const UNSEEN_STEP: f64 = 0.04;
+
 /// A step tells whether the motion depends on the exposure when it was longer than this; it does when the motion took back this
 /// share of it. Where rows tell the motion, whatever their exposure, it does not, and every step would lead to the next.
 const TELLING_STEP: f64 = 0.05;
@@ -84,15 +88,17 @@ impl ExposureSearch<'_> {
 
     /// Exposure times of all frames from those that coarse pictures tell, which is nearly all of it: a lens that is soft over
     /// a pixel or two makes the last few percent.
-    pub(super) fn fine(&self, guess: Guess) -> Exposures {
-        let (fine, power) = self.follow_response(self.window.probe(Resolution::Fine, guess));
-        let Some(settled) = self.settle(Resolution::Fine, fine) else { return Exposures::NoMotion };
+    pub(super) fn fine(&self, coarse: Probe) -> Exposures {
+        let (Probe { guess, tracked: coarse }, power) = self.follow_response(coarse);
+        let Some(settled) = self.settle(Resolution::Fine, self.window.probe(Resolution::Fine, guess)) else {
+            return Exposures::NoMotion;
+        };
         let Settled { probe: Probe { guess, tracked }, is_told } = settled;
         if !is_told {
             return Exposures::Untold;
         }
         let brightness = if self.window.is_whole() {
-            follow_brightness(&tracked, &guess)
+            follow_brightness(&coarse, &guess)
         } else {
             follow_brightness(&self.window.recording.track_everything(&guess), &guess)
         };
@@ -134,7 +140,7 @@ impl ExposureSearch<'_> {
             let exposures = raised(&probe.guess.exposures, power);
             let exposures =
                 scaled(&Guess { exposures, ..probe.guess.clone() }, factor.median.max(0.5)).exposures;
-            probe = self.window.probe(Resolution::Fine, Guess { exposures, ..probe.guess });
+            probe = self.window.probe(Resolution::Coarse, Guess { exposures, ..probe.guess });
         }
         (probe, whole_power)
     }
@@ -173,6 +179,10 @@ impl ExposureSearch<'_> {
             last = Some((step, taken));
             let guess = scaled(&probe.guess, taken.exp());
             if guess == probe.guess {
+                break;
+            }
+            if taken.abs() < UNSEEN_STEP && resolution == Resolution::Fine {
+                probe.guess = guess;
                 break;
             }
             probe = self.window.probe(resolution, guess);

@@ -57,11 +57,19 @@ impl ReadoutSearch<'_> {
         if !is_told {
             return None;
         }
-        let longer: Vec<Option<Spread>> =
-            SHARES[1..].par_iter().map(|share| self.factor(sign * share * interval)).collect();
-        let factors = [Some(first), longer[0], longer[1]];
-        let shares = crossing(&factors)?;
+        let shares = self.crossing(first, sign * interval)?;
         Some(Measured { seconds: sign * shares.seconds * interval, sigma: shares.sigma * interval })
+    }
+
+    /// Share of the time between frames, which has the sign of the rows' direction, at which the factor falls below 1, or the
+    /// longest.
+    fn crossing(&self, shortest: Spread, interval: f64) -> Option<Measured> {
+        let [_, middle, longest] = SHARES;
+        let last = self.factor(longest * interval)?;
+        if last.median >= 1.0 {
+            return Some(Measured { seconds: longest, sigma: BOUNDED * longest });
+        }
+        Some(crossing([shortest, self.factor(middle * interval)?, last]))
     }
 
     /// Motion within the rows over that which the poses give, when rows take `readout` seconds.
@@ -83,40 +91,37 @@ pub(super) fn depth_readout(readout: f64, longer: f64) -> f64 {
     if depth * readout > 0.0 { depth } else { 0.0 }
 }
 
-/// Share of the time between frames at which the factors of [`SHARES`] fall below 1, with its standard deviation, or the last
-/// one.
-fn crossing(factors: &[Option<Spread>; SHARES.len()]) -> Option<Measured> {
-    let last = SHARES[SHARES.len() - 1];
-    for k in 1..SHARES.len() {
-        let (before, after) = (factors[k - 1]?, factors[k]?);
-        if after.median < 1.0 {
-            let slope = (before.median - after.median) / (SHARES[k] - SHARES[k - 1]);
-            let share = SHARES[k - 1] + (before.median - 1.0) / slope;
-            let sigma = (before.sigma.max(after.sigma) / slope).hypot(SYSTEMATIC * share);
-            return Some(Measured { seconds: share, sigma });
-        }
-    }
-    Some(Measured { seconds: last, sigma: BOUNDED * last })
+/// Share of the time between frames at which the factors of [`SHARES`] fall below 1, with its standard deviation. The last one
+/// is below 1.
+fn crossing([shortest, middle, longest]: [Spread; 3]) -> Measured {
+    let [first, second, last] = SHARES;
+    let (before, after, start, length) = if middle.median < 1.0 {
+        (shortest, middle, first, second - first)
+    } else {
+        (middle, longest, second, last - second)
+    };
+    let slope = (before.median - after.median) / length;
+    let share = start + (before.median - 1.0) / slope;
+    let sigma = (before.sigma.max(after.sigma) / slope).hypot(SYSTEMATIC * share);
+    Measured { seconds: share, sigma }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn factors(values: [f64; 3]) -> [Option<Spread>; 3] {
-        values.map(|median| Some(Spread { median, sigma: 0.03 }))
+    fn factors(values: [f64; 3]) -> [Spread; 3] {
+        values.map(|median| Spread { median, sigma: 0.03 })
     }
 
     #[test]
     fn the_readout_is_where_rows_and_poses_agree() {
-        let found = crossing(&factors([1.3, 1.1, 0.9])).unwrap();
+        let found = crossing(factors([1.3, 1.1, 0.9]));
         assert!((found.seconds - 0.775).abs() < 1e-12, "{found:?}");
         // 0.03 over a slope of 0.2 in 0.35, and a twentieth.
         assert!((found.sigma - 0.0525_f64.hypot(0.05 * 0.775)).abs() < 1e-12, "{found:?}");
-        let found = crossing(&factors([1.3, 0.9, 0.7])).unwrap();
+        let found = crossing(factors([1.3, 0.9, 0.7]));
         assert!((found.seconds - 0.525).abs() < 1e-12, "{found:?}");
-        assert_eq!(crossing(&factors([1.5, 1.3, 1.1])).unwrap().seconds, 0.95);
-        assert_eq!(crossing(&[None; 3]), None);
     }
 
     #[test]

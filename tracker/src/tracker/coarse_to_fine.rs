@@ -21,8 +21,11 @@ pub(super) const FINALISTS: usize = 8;
 /// A guess with fewer of the reference's patches in view and in agreement has looked past the scene.
 const MIN_AGREEING: f64 = 0.05;
 
-/// Steps below this many pixels of a competing level are left to the finer ones.
-const COMPETING_MIN_STEP: f64 = 0.1;
+/// Steps below this many pixels of a level are left to the finer ones.
+const COARSE_MIN_STEP: f64 = 0.1;
+
+/// Guesses within this many pixels of a level of each other are one.
+const SAME_PLACE: f64 = 0.3;
 
 /// Step between the rows and columns of the depth map that take part on the competing levels and on the others.
 pub(super) const COMPETING_STRIDE: usize = 4;
@@ -116,16 +119,18 @@ impl FrameTask<'_> {
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
         let mut work = Work::none();
         let mut outcome = LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid));
-        let mut starts: ArrayVec<Estimate, MAX_GUESSES> =
-            guesses.iter().map(|guess| self.estimate_at(guess)).take(MAX_GUESSES).collect();
+        let mut starts = ArrayVec::new();
+        for guess in guesses.iter().take(MAX_GUESSES) {
+            self.add_start(coarsest, guess, self.brightness, &mut starts);
+        }
         for level in (last_competing..=coarsest).rev() {
             let round = self.compete(level, &starts, scratch);
             work += round.work;
             starts.clear();
-            starts.extend(round.finalists.iter().map(|(_, estimate)| Estimate {
-                brightness: estimate.brightness,
-                ..self.estimate_at(&estimate.keyframe_from_camera.mid())
-            }));
+            for (_, estimate) in &round.finalists {
+                let mid = estimate.keyframe_from_camera.mid();
+                self.add_start(level, &mid, estimate.brightness, &mut starts);
+            }
             outcome = round.winner.unwrap_or(outcome);
         }
         for level in (0..last_competing).rev() {
@@ -135,6 +140,25 @@ impl FrameTask<'_> {
         }
         outcome.estimate = self.oriented(outcome.estimate);
         Aligned { outcome, work }
+    }
+
+    /// Adds a start with the motion that is expected around a mid pose, unless there is one at the same place of the level.
+    fn add_start(
+        &self,
+        level: usize,
+        reference_from_mid: &RigidTransform,
+        brightness: BrightnessModel,
+        starts: &mut ArrayVec<Estimate, MAX_GUESSES>,
+    ) {
+        let focal = self.alignment.camera.at_level(level).fx;
+        let is_same = |start: &Estimate| {
+            let apart = start.keyframe_from_camera.mid().tangent_to(reference_from_mid);
+            let (translation, rotation) = (apart.fixed_rows::<3>(0).norm(), apart.fixed_rows::<3>(3).norm());
+            focal * (translation * self.inverse_depth).max(rotation) < SAME_PLACE
+        };
+        if !starts.iter().any(is_same) {
+            starts.push(Estimate { brightness, ..self.estimate_at(reference_from_mid) });
+        }
     }
 
     /// Aligns from every start on one level and ranks where they ended.
@@ -161,7 +185,7 @@ impl FrameTask<'_> {
         let plan = LevelPlan {
             level,
             depth_stride: if competing { COMPETING_STRIDE } else { FINE_STRIDE },
-            min_step: if competing { COMPETING_MIN_STEP } else { self.alignment.settings.min_step },
+            min_step: if level > 0 { COARSE_MIN_STEP } else { self.alignment.settings.min_step },
             max_iterations: self.alignment.settings.max_iterations,
             blur: self.blur,
         };

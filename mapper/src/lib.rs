@@ -14,7 +14,7 @@
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
 //! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
-//! results with the truth.
+//! results with the truth. [`export`] writes runs in the formats of other programs.
 
 mod binary_file;
 pub mod bundle;
@@ -24,6 +24,7 @@ pub mod dataset;
 pub mod deblurring;
 mod error;
 pub mod evaluation;
+pub mod export;
 pub mod exposure;
 pub mod gaussians;
 pub mod image_folders;

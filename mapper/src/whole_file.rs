@@ -103,15 +103,26 @@ fn place<C: AsRef<[u8]>>(
         attempt(path, open_partial(path).and_then(|file| write(file, content.as_ref())))
     };
     let written = files.iter().try_for_each(write_partial);
-    let placed = written
-        .and_then(|()| files.iter().try_for_each(|(path, _)| attempt(path, fs::rename(partial(path), path))));
+    let placed = written.and_then(|()| files.iter().try_for_each(|(path, _)| put_in_place(path)));
     if placed.is_err() {
-        for (path, _) in files {
-            // Only left-overs remain if this fails too.
-            let _ = fs::remove_file(partial(path));
-        }
+        files.iter().for_each(|(path, _)| remove_beside(path));
     }
     placed
+}
+
+/// Writes the content of `path` beside it, where it waits for [`put_in_place`] or [`remove_beside`].
+pub(crate) fn write_beside(path: &Path, content: &[u8]) -> Result<(), FileError> {
+    attempt(path, open_partial(path).and_then(|mut file| file.write_all(content)))
+}
+
+/// Gives a file that was written beside `path` that name.
+pub(crate) fn put_in_place(path: &Path) -> Result<(), FileError> {
+    attempt(path, fs::rename(partial(path), path))
+}
+
+/// Removes what was written beside `path`; only a left-over remains if this fails.
+pub(crate) fn remove_beside(path: &Path) {
+    let _ = fs::remove_file(partial(path));
 }
 
 /// Opens the file beside `path`. One that a kill left is written anew. A link to a file is not followed: that file is

@@ -99,7 +99,8 @@ impl EdgeFrame {
         let mut found = Jumps::default();
         for (place, raw) in jumps(image) {
             let (ray, inverse_depth) = (camera.ray(place[0], place[1]), depth_scale / f64::from(raw));
-            let flows = [motion.velocity, motion.acceleration].map(|motion| flow(&motion, &ray, inverse_depth));
+            let flows =
+                [motion.velocity, motion.acceleration].map(|motion| flow(&motion, &ray, inverse_depth));
             found.push([place, flows[0], flows[1]]);
         }
         Some(Self {
@@ -162,8 +163,7 @@ impl EdgeFrame {
         let (rows, zoom) = (supposed.rows as f32, supposed.zoom as f32);
         let moved = |axis: usize, lane: usize, time: f32| {
             let (sum, difference) = (time + time_of_depth, time - time_of_depth);
-            place[axis][lane]
-                + difference * (velocity[axis][lane] + 0.5 * sum * acceleration[axis][lane])
+            place[axis][lane] + difference * (velocity[axis][lane] + 0.5 * sum * acceleration[axis][lane])
         };
         let time_of_row = |row: f32| rows * ((row + 0.5) / size[1] - 0.5);
         let mut places = [[0.0; LANES]; 2];

@@ -1,5 +1,6 @@
 //! The command line.
 
+pub mod export;
 pub mod map;
 pub mod slam;
 pub mod surface;
@@ -69,6 +70,8 @@ pub enum Command {
     Render(Render),
     /// Write the surface of the map of a RUN folder as a coloured mesh
     Mesh(surface::Mesh),
+    /// Write a RUN folder in the format of another program: nerfstudio, COLMAP, KITTI, EuRoC, TUM
+    Export(export::Export),
     /// Write report.html and charts into a RUN folder
     Report(Report),
     /// Measure an estimate against a reference

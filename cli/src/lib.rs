@@ -68,6 +68,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Ablate(args) => commands::ablate::run(args, console),
         Command::Render(args) => commands::render::run(args, console),
         Command::Mesh(args) => commands::mesh::run(args, console),
+        Command::Export(args) => commands::export::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
         Command::Eval(EvalCommand::Images(args)) => commands::eval_images::run(args, console),

@@ -11,19 +11,21 @@ use super::{non_negative, positive};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The map is rendered from the keyframes of the run. From Gaussians, the depth of all views is fused into one surface; \
-that of a field is where its signed distance is zero. Only what a keyframe sees is kept. FILE is a PLY file with colours that any viewer of meshes opens, in metres.
+that of a field is where its signed distance is zero. Only what a keyframe sees is kept. FILE has colours of vertices, in metres; its ending tells the format: .ply, .glb \
+(binary glTF 2.0) or .obj.
 
 A run has a world of its own, that of its first frame. With --align, the run's trajectory is aligned with another \
-one by positions and orientations, and the mesh is in the frame of that.
+one by positions and orientations, and the mesh is in the frame of that. In a run's own world y points down, and a GLB, which \
+is y-up, is turned to stand upright; with --align it keeps the axes of the other trajectory.
 
 Examples:
-  mba mesh mapped --out mesh.ply
+  mba mesh mapped --out mesh.glb
   mba mesh mapped --out mesh.ply --voxel-cm 0.5 --align data/groundtruth.txt")]
 pub struct Mesh {
     /// RUN folder with a map
     #[arg(value_name = "RUN")]
     pub run: PathBuf,
-    /// PLY file to write; an earlier mesh is replaced. A pipe or device is written to, and - is the standard output
+    /// File to write (.ply, .glb, .obj); an earlier mesh is replaced. A pipe or device is written to, and - is the standard output
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
     /// Write also over what this program did not write; never over a data set

@@ -8,7 +8,7 @@ use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::rendering::Scene;
 use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::surfaces::{
-    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, format_mesh, is_own_mesh, passes,
+    DepthView, FusionSettings, MapViews, MeshFormat, SurfaceError, Trim, ViewSource, YAxis, passes,
     surface_of_map,
 };
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
@@ -43,7 +43,7 @@ struct Written {
 pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
     let start = Instant::now();
     let run = open::run(&args.run)?;
-    let out = output(args, &run)?;
+    let (out, format) = output(args, &run)?;
     let map = open::map(&run)?;
     let map = Scene::from(&map);
     let camera = camera(&run)?;
@@ -65,7 +65,10 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
     if let Some(alignment) = &alignment {
         mesh.transform(&alignment.reference_from_estimate);
     }
-    match out.write(&format_mesh(&mesh)) {
+    let y_axis = if alignment.is_some() { YAxis::AsIs } else { YAxis::Down };
+    let content =
+        format.format(&mesh, y_axis).or_bad_input("give a larger --voxel-cm, or a file that ends in .ply")?;
+    match out.write(&content) {
         Err(error) if !is_disk_full(&error) => {
             Err(error).or_bad_input("name a file for --out that can be written")?;
         }
@@ -88,18 +91,22 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
     console.result(&written, table)
 }
 
-/// Claims the file for the mesh, before the work.
-fn output(args: &Mesh, run: &Run) -> anyhow::Result<OutputFile> {
-    let is_ply = args.out.extension().is_none_or(|extension| extension.eq_ignore_ascii_case("ply"));
+/// Claims the file for the mesh, before the work, and says what its format is.
+fn output(args: &Mesh, run: &Run) -> anyhow::Result<(OutputFile, MeshFormat)> {
     let mut inputs: Vec<&Path> = vec![Path::new(&run.summary.settings.dataset)];
     inputs.extend(args.align.as_deref());
-    let out = OutputFile::claim(&args.out, &Permission { force: args.force, inputs: &inputs }, is_own_mesh)
-        .or_else(refuse)?;
-    if !is_ply && !out.is_stream() {
-        let message = format!("cannot write {}: meshes are written as PLY", args.out.display());
-        return Err(bad_input(message, "name a file that ends in .ply for --out"));
+    let permission = Permission { force: args.force, inputs: &inputs };
+    let out = OutputFile::claim(&args.out, &permission, MeshFormat::is_own).or_else(refuse)?;
+    match MeshFormat::of(&args.out) {
+        Some(format) => Ok((out, format)),
+        // Pipes and devices may have any name.
+        None if out.is_stream() => Ok((out, MeshFormat::Ply)),
+        None => {
+            let (path, endings) = (args.out.display(), MeshFormat::ENDINGS);
+            let message = format!("cannot write {path}: the name of a mesh ends in {endings}");
+            Err(bad_input(message, "give such a name for --out"))
+        }
     }
-    Ok(out)
 }
 
 fn camera(run: &Run) -> anyhow::Result<PinholeCamera> {

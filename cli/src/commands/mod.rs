@@ -8,6 +8,7 @@ pub mod demo;
 pub mod eval_images;
 pub mod eval_mesh;
 pub mod eval_trajectory;
+pub mod export;
 pub mod info;
 pub mod map;
 pub mod mesh;

@@ -96,7 +96,7 @@ mod tests {
         let words: Vec<&str> = lines[0].split(' ').collect();
         assert_eq!((words[0], words[8], words[9]), ("1", "1", "000007.png"));
         let numbers: Vec<f64> = words[1..8].iter().map(|word| word.parse().unwrap()).collect();
-        let half = 0.707_106_781_187;
+        let half = 0.5_f64.sqrt();
         for (number, expected) in numbers.iter().zip([half, 0.0, 0.0, -half, -2.0, 1.0, -3.0]) {
             assert!((number - expected).abs() < 1e-12, "{numbers:?}");
         }

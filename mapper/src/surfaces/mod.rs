@@ -1,4 +1,4 @@
-//! Surfaces: coloured triangles, where they come from, and their files.
+//! Surfaces: coloured triangles, where they come from, and their files (PLY, GLB, OBJ).
 //!
 //! A [`Mesh`] comes from what cameras see of a map ([`ViewSource`], for Gaussians [`MapViews`]) by [`fuse_views`], or
 //! from a signed distance that is known everywhere by [`mesh_from_field`]. [`Sight`] drops what no camera has seen and
@@ -25,7 +25,9 @@ pub use error::SurfaceError;
 pub use field::{FieldBox, mesh_from_field};
 pub use map_views::MapViews;
 pub use mesh::Mesh;
-pub use mesh_file::{format_mesh, is_own_mesh, parse_mesh, read_mesh, write_mesh};
+pub use mesh_file::{
+    MeshFormat, MeshTooLarge, YAxis, format_mesh, is_own_mesh, parse_mesh, read_mesh, write_mesh,
+};
 pub use of_field::surface_of_field;
 pub use sampling::sample_surface;
 pub use sight::{Sight, Trim};

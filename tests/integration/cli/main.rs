@@ -3,6 +3,7 @@
 mod bad_input;
 mod commands;
 mod eval_images;
+mod export;
 #[cfg(unix)]
 mod interrupts;
 mod keyframes;

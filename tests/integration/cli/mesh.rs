@@ -110,6 +110,38 @@ fn a_wall_becomes_a_flat_coloured_mesh_of_what_was_seen() {
 }
 
 #[test]
+fn the_ending_chooses_the_format() {
+    let place = workplace();
+    let truth = place.path().join("groundtruth.txt").into_os_string().into_string().unwrap();
+    for name in ["mesh.ply", "mesh.glb", "mesh.obj"] {
+        // What the program wrote is replaced, whatever the format.
+        fs::copy(place.path().join("mesh.ply"), place.path().join(name)).ok();
+        assert_eq!(mesh(place.path(), name, &["--voxel-cm", "4"]).code, Some(0), "{name}");
+    }
+    let expected = read_mesh(&place.path().join("mesh.ply")).unwrap();
+    let obj = fs::read_to_string(place.path().join("mesh.obj")).unwrap();
+    let [x, y, z] = expected.vertices[0];
+    assert!(obj.lines().nth(1).unwrap().starts_with(&format!("v {x} {y} {z} 1.0000 0.")), "{obj:.200}");
+    assert_eq!(obj.matches("\nf ").count(), expected.triangles.len());
+    let text = |name: &str| -> Value {
+        let glb = fs::read(place.path().join(name)).unwrap();
+        let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+        serde_json::from_slice(&glb[20..20 + length]).unwrap()
+    };
+    let glb = text("mesh.glb");
+    assert_eq!(number(&glb, "/accessors/0/count"), expected.vertices.len() as f64);
+    assert_eq!(number(&glb, "/accessors/1/count"), 3.0 * expected.triangles.len() as f64);
+    // The world of a run is y-down, that of another trajectory is as it is.
+    assert_eq!(number(&glb, "/nodes/0/rotation/0"), 1.0);
+    assert_eq!(mesh(place.path(), "aligned.glb", &["--voxel-cm", "4", "--align", &truth]).code, Some(0));
+    assert!(text("aligned.glb")["nodes"][0].get("rotation").is_none());
+    for name in ["mesh.stl", "mesh.gltf"] {
+        mesh(place.path(), name, &["--voxel-cm", "4"]).assert_error(2, &[name, ".ply, .glb or .obj"]);
+        assert!(!place.path().join(name).exists());
+    }
+}
+
+#[test]
 fn aligned_meshes_are_where_the_truth_is() {
     let place = workplace();
     let truth = place.path().join("groundtruth.txt").into_os_string().into_string().unwrap();

@@ -36,13 +36,16 @@ fn mapped(place: &Workplace, out: &str, options: &[&str]) -> Outcome {
 }
 
 /// The commands that write, without the place.
-fn writers() -> [(&'static str, Vec<&'static str>); 6] {
+fn writers() -> [(&'static str, Vec<&'static str>); 9] {
     [
         ("track", vec!["track", ":data"]),
         ("map", vec!["map", ":data", "--trajectory", ":run", "--time-budget", "0.3"]),
         ("slam", vec!["slam", ":data", "--time-budget", "0.3"]),
         ("render", vec!["render", ":mapped", "--poses", ":run/trajectory.txt", "--size", "32x24"]),
         ("mesh", vec!["mesh", ":mapped", "--voxel-cm", "4"]),
+        ("export of poses", vec!["export", ":run", "--to", "tum"]),
+        ("export of rows", vec!["export", ":run", "--to", "kitti"]),
+        ("export", vec!["export", ":mapped", "--to", "nerfstudio"]),
         ("synth", vec!["synth", "--frames", "2", "--size", "64x48", "--blur", "1", "--scene", "wall"]),
     ]
 }
@@ -109,8 +112,8 @@ fn what_the_command_reads_is_not_written() {
         let mesh = command(&place, &["mesh", ":mapped", "--out", file]);
         mesh.assert_error(2, &["cannot write", "did not write"]);
     }
-    let glb = command(&place, &["mesh", ":mapped", "--out", ":mesh.glb"]);
-    glb.assert_error(2, &["mesh.glb", "PLY"]);
+    let stl = command(&place, &["mesh", ":mapped", "--out", ":mesh.stl"]);
+    stl.assert_error(2, &["mesh.stl", ".ply, .glb or .obj"]);
     assert_eq!(differences(&before, &tree(&place.path(""))), Vec::<PathBuf>::new());
 }
 

@@ -85,6 +85,8 @@ const MAP_OF_ESTIMATES: &[&str] =
 const INFO_OF_REPLICA: &[&str] = &["info", "replica"];
 const INFO_OF_SCANNET: &[&str] = &["info", "scannet"];
 const MESH: &[&str] = &["mesh", "mapped", "--out", "out.ply", "--voxel-cm", "20"];
+const EXPORT: &[&str] = &["export", "mapped", "--to", "nerfstudio", "--out", "out"];
+const EXPORT_POSES: &[&str] = &["export", "run", "--to", "kitti", "--out", "out"];
 const MAP: &[&str] = &["map", "data", "--trajectory", "run", "--out", "out", "--time-budget", "0.05"];
 const TRACK: &[&str] = &["track", "data", "--out", "out"];
 const REPORT: &[&str] = &["report", "run", "--dataset", "data"];
@@ -146,6 +148,12 @@ const SUBJECTS: &[Subject] = &[
     png("images/000000.png", EVAL_IMAGES),
     png("others/000001.png", EVAL_IMAGES),
     binary("mapped/map.ply", MESH),
+    text("run/exposures.txt", EXPORT_POSES),
+    text("run/frames.csv", EXPORT_POSES),
+    text("mapped/summary.json", EXPORT),
+    binary("mapped/map.ply", EXPORT),
+    png("mapped/deblurred/000000.png", EXPORT),
+    png("mapped/depth/000000.png", EXPORT),
     checkpoint("stopped/checkpoint", RESUME),
     checkpoint("stopped_slam/checkpoint", RESUME_SLAM),
 ];

@@ -1,8 +1,13 @@
-//! Meshes and clouds of points as PLY files.
+//! Meshes and clouds of points as PLY files, which are read too, and meshes as GLB and OBJ files.
 
+mod format;
+mod glb;
+mod obj;
 mod read;
 mod write;
 
+pub use format::{MeshFormat, MeshTooLarge};
+pub use glb::YAxis;
 pub use read::{parse_mesh, read_mesh};
 pub use write::{format_mesh, is_own_mesh, write_mesh};
 

@@ -20,6 +20,8 @@ mod nerfstudio;
 mod points;
 mod poses;
 mod scene;
+#[cfg(test)]
+mod tests;
 mod tum;
 
 pub use colmap::{CAMERAS_FILE, IMAGES_FILE, POINTS3D_FILE, format_cameras, format_images, format_points3d};

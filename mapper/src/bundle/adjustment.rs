@@ -16,6 +16,8 @@ use super::path_step::{PathPrior, PathStep};
 use super::rectified::seen_at_once;
 use super::schedule::{Schedule, StepPlan};
 use super::seeding::{self, DepthSource};
+use crate::deblurring::Reblurred;
+use crate::rendering::Scene;
 
 /// How the bundle is adjusted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,6 +100,9 @@ pub struct StepReport {
 
 /// Blur up to this length, pixels, is not seen in a picture: one view shows it.
 const SHARP_PX: f64 = 1.0;
+
+/// Distance along the blur of the virtual views of a picture that is compared with the captured one, pixels.
+const EXPLAINED_SPACING: f64 = 1.0;
 
 /// Frames that are no keyframes are fitted with numbers of draws from here on, which no step has.
 const FITS_FROM: u64 = 1 << 40;
@@ -210,6 +215,27 @@ impl BundleAdjustment {
         let alpha = &renderer.image.alpha;
         let open = alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
         open as f64 / alpha.len().max(1) as f64
+    }
+
+    /// The picture of keyframe `k` as the map explains it, with its blur and its rows, in light as bright as captured; none of
+    /// a field, whose virtual views take half a second each.
+    #[must_use]
+    pub fn explained(&mut self, k: usize) -> Option<Reblurred> {
+        let Scene::Gaussians(gaussians) = self.state.map.scene() else { return None };
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let seen = keyframe.observation.level(0);
+        let plan = StepPlan { level: 0, spacing: EXPLAINED_SPACING, ..self.schedule.plan(1.0, false) };
+        let views = self.settings.view_count(keyframe, frame, &plan).of_row;
+        let gain = frame.log_gain.exp() as f32;
+        let image =
+            self.bench.engine.render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
+        let as_captured = |plane: &Vec<f32>| match &seen.falloff {
+            Some(falloff) => {
+                plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()
+            }
+            None => plane.iter().map(|light| gain * light).collect(),
+        };
+        Some(Reblurred { light: image.colour.each_ref().map(as_captured), alpha: image.alpha.clone() })
     }
 
     /// Number of virtual views of a pixel that a step with `plan` on keyframe `k` renders.

@@ -90,6 +90,23 @@ impl Engine {
         ExposureLoss { terms, by_path, by_log_gain }
     }
 
+    /// The picture of `exposure`, in linear light before the lens and the gain; the loss and its gradients are forgotten.
+    pub fn render(&mut self, gaussians: &Gaussians, exposure: Exposure<'_>) -> &RasterImage {
+        let Exposure { seen, path, views, .. } = exposure;
+        let (scratch, image) = (&mut self.scratch, &mut self.image);
+        self.renderer.forward_rows(
+            gaussians,
+            &seen.camera,
+            path,
+            &seen.times,
+            views,
+            [0.0; 3],
+            scratch,
+            image,
+        );
+        image
+    }
+
     /// Gradients by the map of the last exposure.
     #[must_use]
     pub fn gradients(&self) -> &GaussianGradients {

@@ -63,19 +63,19 @@ pub struct Deblurred {
 /// Deblurs the colour images of one camera. It can be shared by threads; each needs a [`DeblurMemory`] of its own.
 #[derive(Clone, Debug)]
 pub struct KeyframeDeblurrer {
-    camera: PinholeCamera,
+    pub(super) camera: PinholeCamera,
     metres_per_unit: f32,
-    surface_level: usize,
+    pub(super) surface_level: usize,
     region: PixelRectangle,
     inverse: InverseResponse,
     forward: ForwardResponse,
-    readout: Readout,
-    simd: SimdLevel,
+    pub(super) readout: Readout,
+    pub(super) simd: SimdLevel,
 }
 
 /// Memory for deblurring images of one size, one after the other.
 #[derive(Clone, Debug)]
-pub struct DeblurMemory(Vec<u8>);
+pub struct DeblurMemory(pub(super) Vec<u8>);
 
 impl KeyframeDeblurrer {
     /// A deblurrer with the camera, its response and the depth maps of a tracker; `simd` is the instruction
@@ -106,7 +106,7 @@ impl KeyframeDeblurrer {
     }
 
     /// Whether the rows of colour images have times of their own.
-    fn rolls(&self) -> bool {
+    pub(super) fn rolls(&self) -> bool {
         self.readout.colour_rolls()
     }
 
@@ -166,7 +166,7 @@ impl KeyframeDeblurrer {
         Ok(Deblurred { rgb, sharpened: true })
     }
 
-    fn check(&self, frame: &RgbdFrame) -> Result<(), DeblurError> {
+    pub(super) fn check(&self, frame: &RgbdFrame) -> Result<(), DeblurError> {
         let (found, expected) = ((frame.width, frame.height), (self.camera.width, self.camera.height));
         if found != expected {
             return Err(DeblurError::Size { found, expected });
@@ -179,7 +179,7 @@ impl KeyframeDeblurrer {
     }
 
     /// Depth and planes as seen at mid exposure.
-    fn surface<'m>(
+    pub(super) fn surface<'m>(
         &self,
         frame: &RgbdFrame,
         path: &FramePath,
@@ -199,7 +199,7 @@ impl KeyframeDeblurrer {
     }
 
     /// Computes the path of every block of the image; returns the longest in pixels.
-    fn fill_flow(&self, path: &FramePath, surface: &Surface, scratch: &mut DeblurScratch) -> f32 {
+    pub(super) fn fill_flow(&self, path: &FramePath, surface: &Surface, scratch: &mut DeblurScratch) -> f32 {
         let typical = median_measured(surface.map.values);
         scratch.flow.fill(
             &path.reference_from_camera,
@@ -213,7 +213,7 @@ impl KeyframeDeblurrer {
 
     /// Linear light of one colour. Where undistortion left no data, the nearest data is continued: its black border
     /// would be taken for an edge.
-    fn linearise(&self, rgb: &[u8], channel: usize, light: &mut [f32]) {
+    pub(super) fn linearise(&self, rgb: &[u8], channel: usize, light: &mut [f32]) {
         let PixelRectangle { left, top, right, bottom } = self.region;
         let (last_u, last_v) = (right.saturating_sub(1).max(left), bottom.saturating_sub(1).max(top));
         let width = self.camera.width;
@@ -227,7 +227,7 @@ impl KeyframeDeblurrer {
     }
 
     /// Encodes one colour where there is data.
-    fn develop(&self, light: &[f32], channel: usize, rgb: &mut [u8]) {
+    pub(super) fn develop(&self, light: &[f32], channel: usize, rgb: &mut [u8]) {
         let PixelRectangle { left, top, right, bottom } = self.region;
         for v in top..bottom.min(self.camera.height) {
             for index in (left..right.min(self.camera.width)).map(|u| v * self.camera.width + u) {
@@ -238,19 +238,19 @@ impl KeyframeDeblurrer {
 }
 
 /// Depth and planes of an image.
-struct Surface<'m> {
-    map: InverseDepthMap<'m>,
+pub(super) struct Surface<'m> {
+    pub(super) map: InverseDepthMap<'m>,
     planes: SurfacePlanes<'m>,
 }
 
 /// How a frame moved, seen from its own mid pose; s = 0 and 1 are opening and closing of the middle row.
-struct FramePath {
-    reference_from_camera: BowedTrajectory,
-    timing: FrameTiming,
+pub(super) struct FramePath {
+    pub(super) reference_from_camera: BowedTrajectory,
+    pub(super) timing: FrameTiming,
 }
 
 impl FramePath {
-    fn new(frame: &RgbdFrame, exposure: &TimedExposure, readout: &Readout) -> Self {
+    pub(super) fn new(frame: &RgbdFrame, exposure: &TimedExposure, readout: &Readout) -> Self {
         let span = frame.exposure_seconds;
         if !readout.colour_rolls() || span <= 0.0 {
             let linear = ExposureTrajectory { start: exposure.start, end: exposure.end };

@@ -137,8 +137,7 @@ impl Conclusion<'_> {
         let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
         let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
         repairs.into_iter().for_each(|repair| writer.warn(repair));
-        let gains: Vec<f64> = refined.iter().map(|(_, log_gain)| log_gain.exp()).collect();
-        output::write(&mut writer, dataset, &bundle, &exposures, &gains)?;
+        output::write(&mut writer, dataset, &mut bundle, &exposures, &refined)?;
         let figures = MapFigures {
             gaussians: bundle.state.map.size().gaussians(),
             map_file_bytes: writer.map_bytes(),

@@ -2,13 +2,16 @@
 
 use std::fs;
 
+use mba_tracker::SimdLevel;
 use rayon::prelude::*;
 
 use super::prepare::Frames;
-use crate::bundle::{BundleAdjustment, FrameState, Keyframe};
-use crate::dataset::Dataset;
+use crate::bundle::BundleAdjustment;
+use crate::dataset::{Dataset, RgbdFrame};
+use crate::deblurring::{DeblurMemory, KeyframeDeblurrer, Reblurred};
 use crate::rendering::{Behind, ViewRenderer};
 use crate::run::{RunError, RunWriter};
+use crate::tracking::{TrackingOptions, tracker_config};
 use crate::trajectory_file::TimedExposure;
 
 /// Fills a run with the poses that it starts from, and brings its folder up to date: from here on it replaces an
@@ -21,39 +24,89 @@ pub(super) fn push_tracked(writer: &mut RunWriter, frames: &Frames) -> Result<()
     writer.flush()
 }
 
-/// Writes map, refined exposures, deblurred keyframes and their depth.
+/// Keyframes whose pictures are in memory together.
+const TOGETHER: usize = 8;
+
+/// Writes map, exposures, deblurred keyframes and their depth. `refined` has the exposure of every frame as it was fitted to the
+/// map, and its logarithmic gain; `exposures` are what the run says.
 pub(super) fn write(
     writer: &mut RunWriter,
     dataset: &Dataset,
-    bundle: &BundleAdjustment,
+    bundle: &mut BundleAdjustment,
     exposures: &[TimedExposure],
-    gains: &[f64],
+    refined: &[(TimedExposure, f64)],
 ) -> Result<(), RunError> {
     let mut is_keyframe = vec![false; exposures.len()];
     bundle.keyframes().iter().for_each(|keyframe| is_keyframe[keyframe.index] = true);
-    for (index, (exposure, gain)) in exposures.iter().zip(gains).enumerate() {
-        writer.refine(index, *exposure, *gain, is_keyframe[index]);
+    for (index, (exposure, (_, log_gain))) in exposures.iter().zip(refined).enumerate() {
+        writer.refine(index, *exposure, log_gain.exp(), is_keyframe[index]);
     }
     writer.write_map(&bundle.state.map)?;
-    let (camera, response) = (dataset.calibration().camera, dataset.calibration().response.inverse());
-    let depth_scale = dataset.calibration().depth_scale;
-    let falloff = bundle.sensor().falloff.clone();
-    let renderer =
-        || ViewRenderer::new(&bundle.state.map, camera, &response, depth_scale).through(falloff.clone());
-    let pairs: Vec<_> = bundle.keyframes().iter().zip(&bundle.state.frames).collect();
-    let write = |renderer: &mut ViewRenderer<'_>, (keyframe, frame): (&Keyframe, &FrameState)| {
+    let config = tracker_config(dataset, &TrackingOptions::default());
+    let deblurrer = KeyframeDeblurrer::new(&config, SimdLevel::new());
+    let count = bundle.keyframes().len();
+    for first in (0..count).step_by(TOGETHER) {
+        let keyframes = first..count.min(first + TOGETHER);
+        let explained: Vec<_> = keyframes.map(|k| (k, bundle.explained(k))).collect();
+        let pictures = Pictures { dataset, bundle: &*bundle, refined, deblurrer: &deblurrer };
+        let shared = &*writer;
+        let written: Vec<Result<(), RunError>> = explained
+            .into_par_iter()
+            .map_init(
+                || (pictures.renderer(), deblurrer.memory()),
+                |memory, (k, reblurred)| pictures.write(shared, k, reblurred.as_ref(), memory),
+            )
+            .collect();
+        for outcome in written {
+            outcome?;
+            writer.count_deblurred();
+        }
+    }
+    Ok(())
+}
+
+/// What the pictures of keyframes are made of.
+struct Pictures<'a> {
+    dataset: &'a Dataset,
+    bundle: &'a BundleAdjustment,
+    refined: &'a [(TimedExposure, f64)],
+    deblurrer: &'a KeyframeDeblurrer,
+}
+
+impl<'a> Pictures<'a> {
+    fn renderer(&self) -> ViewRenderer<'a> {
+        let calibration = self.dataset.calibration();
+        let response = calibration.response.inverse();
+        ViewRenderer::new(&self.bundle.state.map, calibration.camera, &response, calibration.depth_scale)
+            .through(self.bundle.sensor().falloff.clone())
+    }
+
+    /// Writes the map's depth of keyframe `k`, and its picture with the detail that only the captured one has.
+    fn write(
+        &self,
+        writer: &RunWriter,
+        k: usize,
+        reblurred: Option<&Reblurred>,
+        (renderer, memory): &mut (ViewRenderer<'_>, DeblurMemory),
+    ) -> Result<(), RunError> {
+        let (keyframe, frame) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
         let colour = &keyframe.observation.level(0).colour;
         let behind = Behind::Captured { colour, gain: frame.log_gain.exp() as f32 };
         let view = renderer.render(&frame.path.mid(), behind);
         writer.write_depth(keyframe.index, view.size, &view.depth)?;
-        writer.write_deblurred(keyframe.index, view.size, view.rgb)
-    };
-    let written: Vec<Result<(), RunError>> = pairs.into_par_iter().map_init(renderer, write).collect();
-    for outcome in written {
-        outcome?;
-        writer.count_deblurred();
+        let captured = RgbdFrame {
+            timestamp: self.dataset.timestamp(keyframe.index),
+            depth_timestamp: self.dataset.depth_timestamp(keyframe.index),
+            exposure_seconds: self.dataset.exposure_seconds(keyframe.index),
+            ..keyframe.observation.level(0).frame(keyframe.index, self.dataset.calibration().depth_scale)
+        };
+        let (exposure, _) = &self.refined[keyframe.index];
+        let shown = view.rgb.clone();
+        // A picture of another size than the camera's has no detail to give.
+        let rgb =
+            self.deblurrer.with_detail(&captured, exposure, shown, reblurred, memory).unwrap_or(view.rgb);
+        writer.write_deblurred(keyframe.index, view.size, rgb)
     }
-    Ok(())
 }
 
 /// Most memory that the process had at a time, bytes; 0 where the system does not tell.

@@ -72,7 +72,7 @@ pub enum Command {
     Mesh(surface::Mesh),
     /// Write a RUN folder in the format of another program: nerfstudio, COLMAP, KITTI, EuRoC, TUM
     Export(export::Export),
-    /// Write report.html and charts into a RUN folder
+    /// Write report.html, charts and pictures into a RUN folder
     Report(Report),
     /// Measure an estimate against a reference
     #[command(subcommand)]
@@ -286,7 +286,9 @@ pub enum ViewNames {
 /// Arguments of `mba report`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The report is one HTML file without network access: charts, figures and settings of the run.
+The report is one HTML file without network access: charts, figures and settings of the run. The charts are in \
+plots/ as well, and pictures/ gets the most blurred keyframes, captured, deblurred and true side by side with the \
+estimated motion drawn into the captured one, a detail of each, and views of the map.
 
 Example:
   mba report run")]

@@ -13,54 +13,82 @@ use super::pictures::jpeg_base64;
 /// Width in pixels that pictures are reduced to.
 const WIDTH: u32 = 480;
 
-/// The section of the page; empty for a run without a map. A map that cannot be read is told, not an error: the
-/// rest of the report does not need it.
-///
-/// # Errors
-/// When a picture cannot be encoded.
-pub(super) fn section(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<String> {
-    let Some(path) = StoredMap::path(&run.folder) else { return Ok(String::new()) };
-    let Ok(file) = fs::metadata(&path) else { return Ok(String::new()) };
-    let map = match StoredMap::read(&path) {
-        Ok(map) => map,
-        Err(error) => {
-            return Ok(format!("<h2>Map</h2>\n<p class=\"notice\">{}</p>\n", escape(&error.to_string())));
-        }
-    };
-    let megabytes = file.len() as f64 / 1e6;
-    let about = match &map {
-        StoredMap::Gaussians(map) => format!(
-            "{} Gaussians, {megabytes:.1} MB: <code>{MAP_FILE}</code> opens in any viewer of Gaussian splats.",
-            map.len()
-        ),
-        StoredMap::Field(_) => format!("A tri-plane field, {megabytes:.1} MB: <code>{FIELD_FILE}</code>."),
-    };
-    let own = run.summary.settings.camera.clone();
-    let camera = own.or_else(|| dataset.map(|dataset| RunCamera::from(dataset.calibration())));
-    let views = match &camera {
-        Some(camera) => views(run, &map, camera)?,
-        None => String::new(),
-    };
-    Ok(format!("<h2>Map</h2>\n<p class=\"note\">{about}</p>\n<section class=\"panes\">\n{views}</section>\n"))
+/// What is shown of the map of a run.
+pub(super) struct MapViews {
+    /// The map from where some frames were taken, with the indices of those frames.
+    pub(super) views: Vec<(usize, RgbImage)>,
+    /// What the map is, or why it cannot be read, as HTML; none for a run without a map.
+    about: Option<String>,
+}
+
+impl MapViews {
+    /// Renders the map of `run`, if it has one. A map that cannot be read is told, not an error: the rest of the report
+    /// does not need it.
+    ///
+    /// # Errors
+    /// When the response of the run's camera is none.
+    pub(super) fn new(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<Self> {
+        let none = Self { views: Vec::new(), about: None };
+        let Some(path) = StoredMap::path(&run.folder) else { return Ok(none) };
+        let Ok(file) = fs::metadata(&path) else { return Ok(none) };
+        let map = match StoredMap::read(&path) {
+            Ok(map) => map,
+            Err(error) => {
+                let notice = format!("<p class=\"notice\">{}</p>\n", escape(&error.to_string()));
+                return Ok(Self { about: Some(notice), ..none });
+            }
+        };
+        let megabytes = file.len() as f64 / 1e6;
+        let about = match &map {
+            StoredMap::Gaussians(map) => format!(
+                "{} Gaussians, {megabytes:.1} MB: <code>{MAP_FILE}</code> opens in any viewer of Gaussian splats.",
+                map.len()
+            ),
+            StoredMap::Field(_) => {
+                format!("A tri-plane field, {megabytes:.1} MB: <code>{FIELD_FILE}</code>.")
+            }
+        };
+        let own = run.summary.settings.camera.clone();
+        let camera = own.or_else(|| dataset.map(|dataset| RunCamera::from(dataset.calibration())));
+        let views = camera.map(|camera| views(run, &map, &camera)).transpose()?.unwrap_or_default();
+        Ok(Self { views, about: Some(format!("<p class=\"note\">{about}</p>\n")) })
+    }
+
+    /// The section of the page; empty for a run without a map.
+    ///
+    /// # Errors
+    /// When a picture cannot be encoded.
+    pub(super) fn section(&self) -> anyhow::Result<String> {
+        let Some(about) = &self.about else { return Ok(String::new()) };
+        let figures = self.views.iter().map(figure).collect::<anyhow::Result<String>>()?;
+        let panes = match figures.is_empty() {
+            true => String::new(),
+            false => format!("<section class=\"panes\">\n{figures}</section>\n"),
+        };
+        Ok(format!("<h2>Map</h2>\n{about}{panes}"))
+    }
+}
+
+fn figure((index, image): &(usize, RgbImage)) -> anyhow::Result<String> {
+    let (width, height) = image.dimensions();
+    Ok(format!(
+        "<figure><div class=\"pane\"><img src=\"data:image/jpeg;base64,{}\" width=\"{width}\" \
+         height=\"{height}\" alt=\"the map from frame {index}\"></div>\
+         <figcaption>Rendered from frame {index}.</figcaption></figure>\n",
+        jpeg_base64(image, WIDTH)?
+    ))
 }
 
 /// The map from where some frames were taken.
-fn views(run: &Run, map: &StoredMap, camera: &RunCamera) -> anyhow::Result<String> {
+fn views(run: &Run, map: &StoredMap, camera: &RunCamera) -> anyhow::Result<Vec<(usize, RgbImage)>> {
     let mut renderer =
         ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
-    let mut html = String::new();
-    for index in shown_frames(run) {
+    let render = |index: usize| {
         let view = renderer.render(&run.exposures[index].mid, Behind::Surroundings);
         let [width, height] = view.size.map(|side| side as u32);
-        let Some(image) = RgbImage::from_raw(width, height, view.rgb) else { continue };
-        html.push_str(&format!(
-            "<figure><div class=\"pane\"><img src=\"data:image/jpeg;base64,{}\" width=\"{width}\" \
-             height=\"{height}\" alt=\"the map from frame {index}\"></div>\
-             <figcaption>Rendered from frame {index}.</figcaption></figure>\n",
-            jpeg_base64(&image, WIDTH)?
-        ));
-    }
-    Ok(html)
+        Some((index, RgbImage::from_raw(width, height, view.rgb)?))
+    };
+    Ok(shown_frames(run).into_iter().filter_map(render).collect())
 }
 
 /// First, middle and last keyframe that has poses; of all frames when there is no keyframe.

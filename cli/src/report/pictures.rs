@@ -12,6 +12,7 @@ use mba_mapper::evaluation::psnr;
 use mba_mapper::run::{Run, deblurred_path};
 
 use super::detail::{cut, most_textured};
+use super::motion_lines::motion_lines;
 
 /// Most keyframes in a report.
 const MAX_KEYFRAMES: usize = 6;
@@ -63,22 +64,27 @@ struct Candidate {
 }
 
 /// The images of one keyframe at full size.
-struct Images {
-    index: usize,
-    blur_px: f64,
-    deblurred: RgbImage,
-    captured: Option<RgbImage>,
-    truth: Option<RgbImage>,
+pub(super) struct Images {
+    pub(super) index: usize,
+    pub(super) blur_px: f64,
+    pub(super) deblurred: RgbImage,
+    pub(super) captured: Option<RgbImage>,
+    pub(super) truth: Option<RgbImage>,
+    /// Where points of the scene were imaged during the exposure, as estimated, if the captured image is there.
+    pub(super) lines: Vec<Vec<[f64; 2]>>,
 }
 
-/// Pictures of the most blurred keyframes, spread over the run; none for a run without deblurred images. What cannot
-/// be read is left out.
-pub(super) fn keyframe_pictures(
-    run: &Run,
-    dataset: Option<&Dataset>,
-) -> anyhow::Result<Vec<KeyframePictures>> {
-    let images: Vec<Images> =
-        select(&candidates(run, dataset)).iter().filter_map(|key| read(run, dataset, key)).collect();
+/// The most blurred keyframes, spread over the run; none for a run without deblurred images. What cannot be read is
+/// left out.
+pub(super) fn keyframe_images(run: &Run, dataset: Option<&Dataset>) -> Vec<Images> {
+    select(&candidates(run, dataset)).iter().filter_map(|key| read(run, dataset, key)).collect()
+}
+
+/// The images as the report shows them.
+///
+/// # Errors
+/// When a picture cannot be encoded.
+pub(super) fn keyframe_pictures(images: &[Images]) -> anyhow::Result<Vec<KeyframePictures>> {
     let mut pictures = Vec::new();
     for width in WIDTHS {
         pictures = images.iter().map(|images| pack(images, width)).collect::<anyhow::Result<_>>()?;
@@ -119,14 +125,18 @@ fn read(run: &Run, dataset: Option<&Dataset>, candidate: &Candidate) -> Option<I
     let Candidate { index, blur_px, .. } = *candidate;
     let deblurred = read_image(&deblurred_path(&run.folder, index))?;
     let fits = |image: &RgbImage| image.dimensions() == deblurred.dimensions();
-    let captured = dataset.and_then(|dataset| captured(dataset, index)).filter(fits);
     let truth = dataset.and_then(|dataset| read_image(&truth_path(dataset, index))).filter(fits);
-    Some(Images { index, blur_px, deblurred, captured, truth })
-}
-
-fn captured(dataset: &Dataset, index: usize) -> Option<RgbImage> {
-    let frame = dataset.frame(index).ok()?;
-    RgbImage::from_raw(frame.width as u32, frame.height as u32, frame.rgb)
+    let frame = dataset.and_then(|dataset| Some((dataset.calibration(), dataset.frame(index).ok()?)));
+    let (captured, lines) = match frame {
+        Some((calibration, frame)) => {
+            let line =
+                |exposure| motion_lines(&frame, &calibration.camera, calibration.depth_scale, exposure);
+            let lines = run.exposures.get(index).map(line).unwrap_or_default();
+            (RgbImage::from_raw(frame.width as u32, frame.height as u32, frame.rgb).filter(fits), lines)
+        }
+        None => (None, Vec::new()),
+    };
+    Some(Images { index, blur_px, deblurred, captured, truth, lines })
 }
 
 fn read_image(path: &Path) -> Option<RgbImage> {
@@ -134,9 +144,8 @@ fn read_image(path: &Path) -> Option<RgbImage> {
 }
 
 fn pack(images: &Images, width: u32) -> anyhow::Result<KeyframePictures> {
-    let Images { index, blur_px, deblurred, captured, truth } = images;
+    let Images { index, blur_px, deblurred, captured, truth, .. } = images;
     let jpeg = |image: &RgbImage| jpeg_base64(image, width);
-    let ratio = |image: &RgbImage| psnr(truth.as_ref()?, image).ok();
     Ok(KeyframePictures {
         index: *index,
         blur_px: *blur_px,
@@ -144,15 +153,17 @@ fn pack(images: &Images, width: u32) -> anyhow::Result<KeyframePictures> {
         deblurred: jpeg(deblurred)?,
         captured: captured.as_ref().map(jpeg).transpose()?,
         truth: truth.as_ref().map(jpeg).transpose()?,
-        psnr: captured.as_ref().and_then(|captured| Some([ratio(captured)?, ratio(deblurred)?])),
+        psnr: images.likeness(),
         detail: detail(images)?,
     })
 }
 
 fn detail(images: &Images) -> anyhow::Result<Option<Detail>> {
     let Some(captured) = &images.captured else { return Ok(None) };
-    let part = most_textured(images.truth.as_ref().unwrap_or(&images.deblurred));
-    let jpeg = |image: &RgbImage| jpeg_base64(&cut(image, &part), part.width);
+    let jpeg = |image: &RgbImage| {
+        let part = images.detail_of(image);
+        jpeg_base64(&part, part.width())
+    };
     Ok(Some(Detail {
         captured: jpeg(captured)?,
         deblurred: jpeg(&images.deblurred)?,
@@ -171,6 +182,19 @@ pub(super) fn jpeg_base64(image: &RgbImage, width: u32) -> anyhow::Result<String
         image.write_with_encoder(encoder)?;
     }
     Ok(STANDARD.encode(jpeg))
+}
+
+impl Images {
+    /// Peak signal-to-noise ratios in dB of captured and deblurred image against the truth.
+    pub(super) fn likeness(&self) -> Option<[f64; 2]> {
+        let ratio = |image: &RgbImage| psnr(self.truth.as_ref()?, image).ok();
+        Some([ratio(self.captured.as_ref()?)?, ratio(&self.deblurred)?])
+    }
+
+    /// The part of `image`, one of these, where the truth or else the deblurred image has most texture.
+    pub(super) fn detail_of(&self, image: &RgbImage) -> RgbImage {
+        cut(image, &most_textured(self.truth.as_ref().unwrap_or(&self.deblurred)))
+    }
 }
 
 impl KeyframePictures {

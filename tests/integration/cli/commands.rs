@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::fs;
 use std::path::Path;
 
-use mba_tests::small_dataset::FRAMES;
+use mba_tests::small_dataset::{FRAMES, HEIGHT, WIDTH};
 
 use super::{Workplace, mba};
 
@@ -96,6 +96,13 @@ fn a_tracked_run_can_be_evaluated_and_reported() {
     let inside = page.matches("<img src=\"data:image/jpeg;base64,").count();
     assert_eq!(page.matches("<img").count(), inside, "the report asks for another picture");
     assert!(run.join("plots/trajectory_top.svg").is_file());
+    let picture = image::open(run.join("pictures/keyframe_1.png")).unwrap();
+    // Captured and deblurred; a recording has no truth.
+    assert_eq!((picture.width(), picture.height()), (2 * WIDTH + 6, HEIGHT));
+    assert!(run.join("pictures/detail_1.png").is_file() && !run.join("pictures/map.png").exists());
+    fs::write(run.join("pictures/keyframe_1.png"), "a letter").unwrap();
+    mba([Path::new("report"), &run]).assert_error(2, &["keyframe_1.png"]);
+    assert_eq!(fs::read(run.join("pictures/keyframe_1.png")).unwrap(), b"a letter");
 }
 
 #[test]

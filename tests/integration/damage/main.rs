@@ -172,12 +172,12 @@ impl Subject {
 
     /// What the command may write: its output, or its own files in the run.
     fn may_change(&self, path: &Path) -> bool {
-        let own = match self.command[0] {
-            "report" => ["run/plots", "run/report.html"],
-            "map" if self.command.contains(&"stopped") => ["stopped", "stopped"],
-            "slam" => ["stopped_slam", "stopped_slam"],
-            "mesh" => ["out.ply", "out.ply"],
-            _ => ["out", "out"],
+        let own: &[&str] = match self.command[0] {
+            "report" => &["run/plots", "run/pictures", "run/report.html"],
+            "map" if self.command.contains(&"stopped") => &["stopped"],
+            "slam" => &["stopped_slam"],
+            "mesh" => &["out.ply"],
+            _ => &["out"],
         };
         own.iter().any(|own| path.starts_with(own))
     }

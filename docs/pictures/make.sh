@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Makes the pictures of this folder anew, from the synthetic sequence of the demo. It takes about ten minutes on two cores.
+# Makes the pictures of this folder anew, from the synthetic sequence of the demo. It takes some minutes.
 #
 #     bash docs/pictures/make.sh
 #

@@ -83,7 +83,7 @@ pub enum Command {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 The folder gets the sequence (kept for the next time), a RUN folder as `mba track` writes it, and one as \
-`mba map` does, with charts and report.html.
+`mba map` does, with charts, pictures and report.html.
 
 Example:
   mba demo --quick")]

@@ -60,7 +60,7 @@ fn dataset_hint(error: &DatasetError) -> &'static str {
     match error {
         DatasetError::File(_) => "correct that line or file",
         DatasetError::UnknownLayout { .. } => "give the folder that holds the lists of images",
-        DatasetError::MissingCalibration { .. } => "see the data set section of the README for an example",
+        DatasetError::MissingCalibration { .. } => "see docs/formats.md for an example",
         DatasetError::CalibrationSyntax { .. } | DatasetError::CalibrationValue { .. } => {
             "correct the calibration; lengths are in pixels of the stored images, times in seconds"
         }

@@ -93,12 +93,12 @@ mod tests {
 
     #[test]
     fn a_label_is_ink_on_a_plate_and_cut_off_at_the_edge() {
-        let mut image = RgbImage::from_pixel(30, 40, Rgb([100; 3]));
+        let mut image = RgbImage::from_pixel(24, 40, Rgb([100; 3]));
         label(&mut image, "l-");
         // The stem of the l: the third of its five columns, after the border.
         assert_eq!(image.get_pixel(DOT * (BORDER + 2), DOT * (BORDER + 3)), &INK);
         assert_eq!(image.get_pixel(DOT * BORDER, DOT * (BORDER + 3)), &PLATE);
-        assert_eq!(image.get_pixel(29, DOT * (BORDER + 3)), &INK, "the bar of the - goes on to the edge");
+        assert_eq!(image.get_pixel(23, DOT * (BORDER + 3)), &INK, "the bar of the - goes on to the edge");
         assert_eq!(image.get_pixel(5, DOT * (HEIGHT + 2 * BORDER)), &Rgb([100; 3]), "below the plate");
     }
 

@@ -101,9 +101,6 @@ pub struct StepReport {
 /// Blur up to this length, pixels, is not seen in a picture: one view shows it.
 const SHARP_PX: f64 = 1.0;
 
-/// Distance along the blur of the virtual views of a picture that is compared with the captured one, pixels.
-const EXPLAINED_SPACING: f64 = 1.0;
-
 /// Frames that are no keyframes are fitted with numbers of draws from here on, which no step has.
 const FITS_FROM: u64 = 1 << 40;
 
@@ -224,7 +221,7 @@ impl BundleAdjustment {
         let Scene::Gaussians(gaussians) = self.state.map.scene() else { return None };
         let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
         let seen = keyframe.observation.level(0);
-        let plan = StepPlan { level: 0, spacing: EXPLAINED_SPACING, ..self.schedule.plan(1.0, false) };
+        let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
         let views = self.settings.view_count(keyframe, frame, &plan).of_row;
         let gain = frame.log_gain.exp() as f32;
         let image =

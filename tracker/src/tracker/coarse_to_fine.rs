@@ -22,9 +22,10 @@ pub(super) const FINALISTS: usize = 8;
 const MIN_AGREEING: f64 = 0.05;
 
 /// Steps below this many pixels of a level are left to the finer ones.
-const COARSE_MIN_STEP: f64 = 0.1;
+const COARSE_MIN_STEP: f64 = 0.05;
 
-/// Guesses within this many pixels of a level of each other are one.
+/// Guesses that ended within this many pixels of a level of each other go on as one. They all start, however near: which of two
+/// neighbours finds the way out of a long blur is not known before.
 const SAME_PLACE: f64 = 0.3;
 
 /// Step between the rows and columns of the depth map that take part on the competing levels and on the others.
@@ -119,10 +120,8 @@ impl FrameTask<'_> {
         let last_competing = (coarsest + 1).saturating_sub(COMPETING_LEVELS);
         let mut work = Work::none();
         let mut outcome = LevelOutcome::unchanged(self.estimate_at(&self.motion.reference_from_mid));
-        let mut starts = ArrayVec::new();
-        for guess in guesses.iter().take(MAX_GUESSES) {
-            self.add_start(coarsest, guess, self.brightness, &mut starts);
-        }
+        let mut starts: ArrayVec<Estimate, MAX_GUESSES> =
+            guesses.iter().map(|guess| self.estimate_at(guess)).take(MAX_GUESSES).collect();
         for level in (last_competing..=coarsest).rev() {
             let round = self.compete(level, &starts, scratch);
             work += round.work;

@@ -24,9 +24,9 @@ const MIN_AGREEING: f64 = 0.05;
 /// Steps below this many pixels of a level are left to the finer ones.
 const COARSE_MIN_STEP: f64 = 0.05;
 
-/// Guesses that ended within this many pixels of a level of each other go on as one. They all start, however near: which of two
-/// neighbours finds the way out of a long blur is not known before.
-const SAME_PLACE: f64 = 0.3;
+/// Guesses that ended within this many pixels of a level of each other go on as one: less than the last step of any. Farther
+/// apart, one may find the way out of a long blur and its neighbour not.
+const SAME_PLACE: f64 = 0.03;
 
 /// Step between the rows and columns of the depth map that take part on the competing levels and on the others.
 pub(super) const COMPETING_STRIDE: usize = 4;

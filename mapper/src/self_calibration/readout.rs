@@ -20,8 +20,10 @@ const SHARES: [f64; 3] = [0.3, 0.6, 0.95];
 const MIN_CERTAINTY: f64 = 2.0;
 const MIN_CERTAINTY_UNTOLD: f64 = 3.0;
 
-/// Standard deviations by which the other direction of the rows has to be worse, or better.
+/// Standard deviations by which the other direction of the rows has to be worse, or better; less for rows from the top, as nearly
+/// all sensors have them, where somebody says that they follow each other.
 const MIN_DIFFERENCE: f64 = 3.0;
+const MIN_DIFFERENCE_FROM_TOP: f64 = 2.0;
 
 /// Relative error of a readout: of paths, and of the polynomial between poses. More where the time between frames bounds it.
 const SYSTEMATIC: f64 = 0.05;
@@ -51,7 +53,10 @@ impl ReadoutSearch<'_> {
         let excess = (first.median - 1.0) / first.sigma.max(f64::MIN_POSITIVE);
         let has_direction = difference.abs() > MIN_DIFFERENCE;
         let is_told = match self.is_rolling {
-            true => excess > MIN_CERTAINTY || (excess > 0.0 && has_direction),
+            true => {
+                let has_direction = has_direction || difference > MIN_DIFFERENCE_FROM_TOP;
+                excess > MIN_CERTAINTY || (excess > 0.0 && has_direction)
+            }
             false => excess > MIN_CERTAINTY_UNTOLD && has_direction,
         };
         if !is_told {

@@ -71,10 +71,15 @@ fn a_field_survives_a_kill_and_is_rendered_from_its_file() {
     let rendered =
         mba(["render".into(), run, "--poses".into(), poses, "--out".into(), out, "--json".into()]).json();
     assert!(rendered["solid_share"].as_f64().unwrap() > 0.97, "{rendered}");
-    // The first keyframe has the gain of the map; the file keeps 16 bits of each value.
-    let read = |path: &str| image::open(folder.join(path)).unwrap().into_rgb8().into_raw();
-    let psnr = psnr(&read("whole/deblurred/000000.png"), &read("views/000000.png")).unwrap();
-    assert!(psnr > 35.0, "{psnr} dB between view and deblurred keyframe");
+    // The file keeps 16 bits of each value: depth is that of the run, to 5 mm in all but a hundredth of the pixels.
+    let depth = |path: &str| image::open(folder.join(path)).unwrap().into_luma16().into_raw();
+    let (written, read) = (depth("whole/depth/000000.png"), depth("views/depth/000000.png"));
+    let near = written.iter().zip(&read).filter(|(a, b)| a.abs_diff(**b) <= 25).count();
+    assert!(near * 100 >= 99 * written.len(), "{near} of {} depths", written.len());
+    // The deblurred keyframe has the gain of the map, and detail besides that only the captured picture knows.
+    let colour = |path: &str| image::open(folder.join(path)).unwrap().into_rgb8().into_raw();
+    let psnr = psnr(&colour("whole/deblurred/000000.png"), &colour("views/000000.png")).unwrap();
+    assert!(psnr > 25.0, "{psnr} dB between view and deblurred keyframe");
 }
 
 #[test]

@@ -68,11 +68,12 @@ fn keyframes_have_the_fall_off_of_the_lens() {
     assert_eq!(known.vignetting, vignetting);
     let [with, without] = [vignetting, Vignetting::NONE].map(|vignetting| {
         let known = Calibration { vignetting, ..known.clone() };
-        mapped(&sequence, known, MapKind::Gaussians).map.unwrap().keyframe_psnr.unwrap()
+        mapped(&sequence, known, MapKind::Gaussians).map.unwrap().loss
     });
-    println!("{with} dB with the fall-off, {without} dB without");
-    // Measured: 31.8 and 31.4 dB. Frames that look nearly the same way hide the fall-off in the colours of the map.
-    assert!(with > without + 0.2, "{with} dB, {without} dB");
+    println!("loss {with} with the fall-off, {without} without");
+    // Measured: 0.0154 and 0.0171. Frames that look nearly the same way hide much of the fall-off in the colours of the map.
+    // Deblurred keyframes hardly differ: what the map does not explain comes back from the captured picture.
+    assert!(with < 0.95 * without, "{with}, {without}");
 }
 
 #[test]

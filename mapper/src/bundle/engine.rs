@@ -73,10 +73,10 @@ impl Engine {
         exposure: Exposure<'_>,
         plan: &StepPlan,
     ) -> ExposureLoss {
-        let Exposure { seen, path, gain, views } = exposure;
+        self.render(gaussians, exposure);
+        let Exposure { seen, gain, .. } = exposure;
         let (camera, gain) = (&seen.camera, gain as f32);
         let (scratch, image) = (&mut self.scratch, &mut self.image);
-        self.renderer.forward_rows(gaussians, camera, path, &seen.times, views, [0.0; 3], scratch, image);
         let mut terms = self.planes.compare(&self.curve, gain, image, seen, plan.weights.colour);
         if plan.weights.similarity > 0.0 {
             let size = [camera.width, camera.height];

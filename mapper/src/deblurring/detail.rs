@@ -6,9 +6,8 @@
 //! map has it. Noise is held back where the left-over is no more than noise (Wiener's gain in a window). So a frame that was
 //! captured sharp is not spoilt by the map, and the map decides where nothing else can.
 
-use mba_tracker::deblur::{BLOCK_HEIGHT, BLOCK_WIDTH, BlurFlow, DeblurScratch, blur_along};
+use mba_tracker::deblur::{BLOCK_HEIGHT, BLOCK_WIDTH, BlurFlow, DeblurScratch, blur_along, tap_count};
 use mba_tracker::keyframe::RectifyScratch;
-use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
 use mba_tracker::workspace::Arena;
 
 use super::keyframe::{DeblurError, DeblurMemory, FramePath, KeyframeDeblurrer, Surface};
@@ -17,9 +16,6 @@ use crate::trajectory_file::TimedExposure;
 
 /// Landweber iterations: one brings back what is hardly blurred, a second the first order of what is; more fit noise.
 const ITERATIONS: usize = 2;
-
-/// Distance between neighbouring taps along the longest path, pixels.
-const TAP_SPACING: f32 = 1.5;
 
 /// Pixels whose left-over is compared with noise together, to either side: 7 x 7.
 const REACH: usize = 3;
@@ -63,6 +59,9 @@ impl KeyframeDeblurrer {
     ///
     /// # Errors
     /// [`DeblurError::Size`], [`DeblurError::Buffer`] or [`DeblurError::Memory`].
+    ///
+    /// # Panics
+    /// When `sharp` or `reblurred` have another size than the frame.
     pub fn with_detail(
         &self,
         frame: &RgbdFrame,
@@ -74,7 +73,9 @@ impl KeyframeDeblurrer {
         self.check(frame)?;
         let pixels = frame.width * frame.height;
         let fits = |of: &Reblurred| of.light.iter().chain([&of.alpha]).all(|plane| plane.len() == pixels);
-        if sharp.len() != 3 * pixels || !reblurred.is_none_or(fits) || (self.rolls() && reblurred.is_none()) {
+        assert_eq!(sharp.len(), 3 * pixels, "bytes of the map's picture");
+        assert!(reblurred.is_none_or(fits), "the blurred picture has another size than the frame");
+        if self.rolls() && reblurred.is_none() {
             return Ok(sharp);
         }
         let mut arena = Arena::new(&mut memory.0);
@@ -87,7 +88,7 @@ impl KeyframeDeblurrer {
         let blur = Blur {
             simd: self.simd,
             flow: &scratch.flow,
-            views: ((longest / TAP_SPACING) as usize + 2).clamp(3, MAX_VIRTUAL_VIEWS),
+            views: tap_count(longest),
             trusted: if reblurred.is_some() { TRUSTED_BLUR } else { TRUSTED_FLOW },
         };
         let light = |rgb: &[u8], channel: usize| {
@@ -250,28 +251,9 @@ fn window_mean(image: &[f32], width: usize) -> Vec<f32> {
 
 #[cfg(test)]
 mod tests {
-    use mba_tracker::photometric::InverseResponse;
-    use mba_tracker::{SimdLevel, TrackerConfig};
-
+    use super::super::keyframe::tests::{deblurrer, sequence, timed};
     use super::*;
     use crate::evaluation::psnr;
-    use crate::synth::{SynthConfig, SynthSequence};
-
-    fn sequence() -> SynthSequence {
-        let config =
-            SynthConfig { frames: 3, width: 160, height: 120, mean_blur_px: 4.0, ..SynthConfig::default() };
-        SynthSequence::new(config).unwrap()
-    }
-
-    fn deblurrer(sequence: &SynthSequence) -> KeyframeDeblurrer {
-        let config = TrackerConfig::new(sequence.camera(), 1.0 / 5000.0, InverseResponse::srgb());
-        KeyframeDeblurrer::new(&config, SimdLevel::new())
-    }
-
-    fn timed(sequence: &SynthSequence, index: usize) -> TimedExposure {
-        let path = sequence.exposure(index);
-        TimedExposure { timestamp: 0.0, start: path.start, mid: path.mid(), end: path.end }
-    }
 
     /// A map that has lost half of the finest detail: each pixel is half the mean of nine.
     fn soft(truth: &[u8], width: usize) -> Vec<u8> {
@@ -303,7 +285,7 @@ mod tests {
             let frame = sequence.render_frame(index).into_captured(0);
             let mut memory = deblurrer.memory();
             let detailed = deblurrer
-                .with_detail(&frame, &timed(&sequence, index), map.clone(), None, &mut memory)
+                .with_detail(&frame, &timed(&sequence.exposure(index)), map.clone(), None, &mut memory)
                 .unwrap();
             let [captured, before, after] =
                 [&frame.rgb, &map, &detailed].map(|image| psnr(&truth, image).unwrap());
@@ -322,7 +304,7 @@ mod tests {
         let sequence = sequence();
         let deblurrer = deblurrer(&sequence);
         let (truth, frame) = (sequence.render_sharp(0), sequence.render_frame(0).into_captured(0));
-        let exposure = timed(&sequence, 0);
+        let exposure = timed(&sequence.exposure(0));
         let detailed =
             deblurrer.with_detail(&frame, &exposure, truth.clone(), None, &mut deblurrer.memory()).unwrap();
         let psnr = psnr(&truth, &detailed).unwrap();
@@ -337,12 +319,22 @@ mod tests {
         let frame = sequence.render_frame(0).into_captured(0);
         let pixels = frame.width * frame.height;
         let nothing = Reblurred { light: [0, 1, 2].map(|_| vec![0.0; pixels]), alpha: vec![0.0; pixels] };
-        let exposure = timed(&sequence, 0);
+        let exposure = timed(&sequence.exposure(0));
         let shown = sequence.render_sharp(0);
         let detailed = deblurrer
             .with_detail(&frame, &exposure, shown.clone(), Some(&nothing), &mut deblurrer.memory())
             .unwrap();
         assert_eq!(detailed, shown);
+    }
+
+    #[test]
+    #[should_panic(expected = "bytes of the map's picture")]
+    fn a_picture_of_another_size_is_a_mistake() {
+        let sequence = sequence();
+        let deblurrer = deblurrer(&sequence);
+        let frame = sequence.render_frame(0).into_captured(0);
+        let exposure = timed(&sequence.exposure(0));
+        let _ = deblurrer.with_detail(&frame, &exposure, vec![0; 3], None, &mut deblurrer.memory());
     }
 
     #[test]

@@ -281,22 +281,22 @@ fn median_measured(values: &[f32]) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
-
-    fn timed(path: &ExposureTrajectory) -> TimedExposure {
-        TimedExposure { timestamp: 0.0, start: path.start, mid: path.mid(), end: path.end }
-    }
     use crate::evaluation::psnr;
     use crate::synth::{SynthConfig, SynthSequence};
 
-    fn sequence() -> SynthSequence {
+    pub(in crate::deblurring) fn timed(path: &ExposureTrajectory) -> TimedExposure {
+        TimedExposure { timestamp: 0.0, start: path.start, mid: path.mid(), end: path.end }
+    }
+
+    pub(in crate::deblurring) fn sequence() -> SynthSequence {
         let config =
             SynthConfig { frames: 3, width: 160, height: 120, mean_blur_px: 4.0, ..SynthConfig::default() };
         SynthSequence::new(config).unwrap()
     }
 
-    fn deblurrer(sequence: &SynthSequence) -> KeyframeDeblurrer {
+    pub(in crate::deblurring) fn deblurrer(sequence: &SynthSequence) -> KeyframeDeblurrer {
         let config = TrackerConfig::new(sequence.camera(), 1.0 / 5000.0, InverseResponse::srgb());
         KeyframeDeblurrer::new(&config, SimdLevel::new())
     }

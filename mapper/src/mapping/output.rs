@@ -102,7 +102,7 @@ impl<'a> Pictures<'a> {
         };
         let (exposure, _) = &self.refined[keyframe.index];
         let shown = view.rgb.clone();
-        // A picture of another size than the camera's has no detail to give.
+        // Observations have the size of the camera, and the memory is for it; else the map's picture stays.
         let rgb =
             self.deblurrer.with_detail(&captured, exposure, shown, reblurred, memory).unwrap_or(view.rgb);
         writer.write_deblurred(keyframe.index, view.size, rgb)

@@ -1,33 +1,27 @@
 //! A folder in the layout of another program, with a list of what was written.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 use super::folder::Layout;
-use super::{OutputError, OutputFolder, Permission};
+use super::listed::{FileList, ListedFolder, remove};
+use super::{OutputError, Permission};
 use crate::FileError;
-use crate::whole_file::{put_in_place, read_text, remove_beside, write_beside, write_text};
+use crate::whole_file::{put_in_place, remove_beside, write_beside};
 
-/// Name of the list of files.
-const LIST_FILE: &str = ".mba-export";
-
-/// First line of the list.
-const TITLE: &str = "files that mba export wrote";
+const LIST: FileList = FileList { file: ".mba-export", title: "files that mba export wrote", is_plain };
 
 /// Folders that an export may have, those inside of others after them.
 const FOLDERS: [&str; 4] = ["images", "depth", "sparse", "sparse/0"];
 
-const EXPORT: Layout = Layout { recognise: |folder| read_list(folder).is_some(), folders: &FOLDERS };
+const EXPORT: Layout = Layout { recognise: |folder| LIST.read(folder).is_some(), folders: &FOLDERS };
 
 /// A folder for the files of an export, locked until this is dropped.
 ///
 /// An earlier export stays as it is until all files of the new one are on the disk, beside their places.
 #[derive(Debug)]
 pub struct ExportFolder {
-    folder: OutputFolder,
-    earlier: BTreeSet<String>,
-    names: BTreeSet<String>,
+    folder: ListedFolder,
     /// Written beside their places.
     waiting: Vec<PathBuf>,
 }
@@ -43,17 +37,11 @@ impl ExportFolder {
         permission: &Permission<'_>,
         names: impl IntoIterator<Item = String>,
     ) -> Result<Self, OutputError> {
-        let folder = OutputFolder::claim(path, permission, &EXPORT)?;
-        let names: BTreeSet<String> = names.into_iter().collect();
-        let earlier = read_list(path).unwrap_or_default();
-        let is_foreign = |name: &&String| !earlier.contains(*name) && path.join(name).exists();
-        if let (false, Some(name)) = (permission.force, names.iter().find(is_foreign)) {
-            return Err(OutputError::Foreign { path: path.to_owned(), found: name.clone() });
-        }
-        for inner in names.iter().filter_map(|name| path.join(name).parent().map(Path::to_owned)) {
+        let folder = ListedFolder::claim(path, permission, (&EXPORT, &LIST), names)?;
+        for inner in folder.names().iter().filter_map(|name| path.join(name).parent().map(Path::to_owned)) {
             fs::create_dir_all(&inner).map_err(|reason| OutputError::unwritable(&inner, reason))?;
         }
-        Ok(Self { folder, earlier, names, waiting: Vec::new() })
+        Ok(Self { folder, waiting: Vec::new() })
     }
 
     /// Writes the content of a file beside its place, where it waits for [`Self::finish`].
@@ -71,23 +59,17 @@ impl ExportFolder {
     /// # Errors
     /// When a file cannot be renamed or removed, or the list not be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
-        // Whatever comes from here on is on the list, also if this process ends before it is done.
-        write_list(self.folder.path(), &self.earlier.union(&self.names).cloned().collect())?;
+        self.folder.begin()?;
         for path in std::mem::take(&mut self.waiting) {
             put_in_place(&path)?;
         }
-        for name in self.earlier.difference(&self.names) {
+        for name in self.folder.left_over() {
             let path = self.folder.path().join(name);
             remove_beside(&path);
-            match fs::remove_file(&path) {
-                Err(reason) if reason.kind() != std::io::ErrorKind::NotFound => {
-                    return Err(OutputError::unwritable(&path, reason));
-                }
-                _ => {}
-            }
+            remove(&path)?;
         }
         remove_empty(self.folder.path());
-        Ok(write_list(self.folder.path(), &self.names)?)
+        self.folder.end()
     }
 }
 
@@ -104,21 +86,6 @@ fn remove_empty(path: &Path) {
     for name in FOLDERS.iter().rev() {
         let _ = fs::remove_dir(path.join(name));
     }
-}
-
-fn write_list(folder: &Path, names: &BTreeSet<String>) -> Result<(), FileError> {
-    let lines: String = names.iter().map(|name| format!("{name}\n")).collect();
-    write_text(&folder.join(LIST_FILE), &format!("{TITLE}\n{lines}"))
-}
-
-/// The list of a folder, if it has one; names that no export has are not believed.
-fn read_list(folder: &Path) -> Option<BTreeSet<String>> {
-    let text = read_text(&folder.join(LIST_FILE)).ok()?;
-    let mut lines = text.lines();
-    if lines.next() != Some(TITLE) {
-        return None;
-    }
-    Some(lines.filter(|name| is_plain(name)).map(str::to_owned).collect())
 }
 
 /// Whether a name is that of a file in the folder or in one that an export may have.
@@ -191,7 +158,7 @@ mod tests {
         // Images of others are not mixed with those that come, not even by force.
         assert!(matches!(claim(place.path(), true, &["a.txt"]), Err(OutputError::Foreign { .. })));
         let names = "../a.txt\n/a.txt\nrgb/1.png\nimages/../a.txt\nimages\nimages\\1.png\nimages/1.png\n";
-        fs::write(place.path().join(LIST_FILE), format!("{TITLE}\n{names}")).unwrap();
-        assert_eq!(read_list(place.path()).unwrap().into_iter().collect::<Vec<_>>(), ["images/1.png"]);
+        fs::write(place.path().join(LIST.file), format!("{}\n{names}", LIST.title)).unwrap();
+        assert_eq!(LIST.read(place.path()).unwrap().into_iter().collect::<Vec<_>>(), ["images/1.png"]);
     }
 }

@@ -15,6 +15,7 @@ mod error;
 mod export;
 mod file;
 mod folder;
+mod listed;
 mod lock;
 mod place;
 mod views;

@@ -1,30 +1,24 @@
 //! A folder of rendered views, with a list of what was written.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::folder::Layout;
-use super::{OutputError, OutputFolder, Permission};
-use crate::FileError;
+use super::listed::{FileList, ListedFolder, remove};
+use super::{OutputError, Permission};
 use crate::run::DEPTH_FOLDER;
-use crate::whole_file::{read_text, write_text};
 
-/// Name of the list of views.
-const LIST_FILE: &str = ".mba-views";
+const LIST: FileList = FileList {
+    file: ".mba-views",
+    title: "views that mba wrote, here and in depth/",
+    is_plain: |name| name.ends_with(".png") && !name.contains(['/', '\\']),
+};
 
-/// First line of the list.
-const TITLE: &str = "views that mba wrote, here and in depth/";
-
-const VIEWS: Layout = Layout { recognise: |folder| read_list(folder).is_some(), folders: &[DEPTH_FOLDER] };
+const VIEWS: Layout = Layout { recognise: |folder| LIST.read(folder).is_some(), folders: &[DEPTH_FOLDER] };
 
 /// A folder of colour images, with depth images of the same names in `depth`, locked until this is dropped.
 #[derive(Debug)]
-pub struct ViewFolder {
-    folder: OutputFolder,
-    earlier: BTreeSet<String>,
-    names: BTreeSet<String>,
-}
+pub struct ViewFolder(ListedFolder);
 
 impl ViewFolder {
     /// Claims `path`, a new or empty folder or one with earlier views, for images of these names, and makes it.
@@ -36,24 +30,17 @@ impl ViewFolder {
         permission: &Permission<'_>,
         names: impl IntoIterator<Item = String>,
     ) -> Result<Self, OutputError> {
-        let folder = OutputFolder::claim(path, permission, &VIEWS)?;
-        let names: BTreeSet<String> = names.into_iter().collect();
-        let earlier = read_list(path).unwrap_or_default();
-        let is_foreign = |name: &&String| !earlier.contains(*name) && path.join(name).exists();
-        if let (false, Some(name)) = (permission.force, names.iter().find(is_foreign)) {
-            return Err(OutputError::Foreign { path: path.to_owned(), found: name.clone() });
-        }
+        let folder = ListedFolder::claim(path, permission, (&VIEWS, &LIST), names)?;
         let depth = path.join(DEPTH_FOLDER);
         fs::create_dir_all(&depth).map_err(|reason| OutputError::unwritable(&depth, reason))?;
-        // Whatever is written from here on is on the list, also if this process ends before it is done.
-        write_list(path, &earlier.union(&names).cloned().collect())?;
-        Ok(Self { folder, earlier, names })
+        folder.begin()?;
+        Ok(Self(folder))
     }
 
     /// Where the colour and the depth image of a name belong.
     #[must_use]
     pub fn paths(&self, name: &str) -> [PathBuf; 2] {
-        [self.folder.path().join(name), self.folder.path().join(DEPTH_FOLDER).join(name)]
+        [self.0.path().join(name), self.0.path().join(DEPTH_FOLDER).join(name)]
     }
 
     /// Removes the views of earlier times that were not written again.
@@ -61,38 +48,17 @@ impl ViewFolder {
     /// # Errors
     /// When a file cannot be removed or the list not be written.
     pub fn finish(self) -> Result<(), OutputError> {
-        for name in self.earlier.difference(&self.names) {
-            for path in self.paths(name) {
-                match fs::remove_file(&path) {
-                    Err(reason) if reason.kind() != std::io::ErrorKind::NotFound => {
-                        return Err(OutputError::unwritable(&path, reason));
-                    }
-                    _ => {}
-                }
-            }
+        for name in self.0.left_over() {
+            self.paths(name).iter().try_for_each(|path| remove(path))?;
         }
-        Ok(write_list(self.folder.path(), &self.names)?)
+        self.0.end()
     }
-}
-
-fn write_list(folder: &Path, names: &BTreeSet<String>) -> Result<(), FileError> {
-    let lines: String = names.iter().map(|name| format!("{name}\n")).collect();
-    write_text(&folder.join(LIST_FILE), &format!("{TITLE}\n{lines}"))
-}
-
-/// The list of a folder, if it has one; names that are no plain ones of images are not believed.
-fn read_list(folder: &Path) -> Option<BTreeSet<String>> {
-    let text = read_text(&folder.join(LIST_FILE)).ok()?;
-    let mut lines = text.lines();
-    if lines.next() != Some(TITLE) {
-        return None;
-    }
-    let is_plain = |name: &&str| name.ends_with(".png") && !name.contains(['/', '\\']);
-    Some(lines.filter(is_plain).map(str::to_owned).collect())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
 
     fn claim(folder: &Path, names: &[&str]) -> Result<ViewFolder, OutputError> {
@@ -128,7 +94,8 @@ mod tests {
     #[test]
     fn a_list_names_images_only() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(LIST_FILE), format!("{TITLE}\n../b.png\na.png\na.txt\n")).unwrap();
-        assert_eq!(read_list(folder.path()), Some(BTreeSet::from(["a.png".to_owned()])));
+        fs::write(folder.path().join(LIST.file), format!("{}\n../b.png\na.png\na.txt\n", LIST.title))
+            .unwrap();
+        assert_eq!(LIST.read(folder.path()), Some(BTreeSet::from(["a.png".to_owned()])));
     }
 }

@@ -62,19 +62,9 @@ impl ReadoutSearch<'_> {
         if !is_told {
             return None;
         }
-        let shares = self.crossing(first, sign * interval)?;
+        let [_, middle, longest] = SHARES.map(|share| sign * share * interval);
+        let shares = crossing(first, self.factor(longest)?, || self.factor(middle))?;
         Some(Measured { seconds: sign * shares.seconds * interval, sigma: shares.sigma * interval })
-    }
-
-    /// Share of the time between frames, which has the sign of the rows' direction, at which the factor falls below 1, or the
-    /// longest.
-    fn crossing(&self, shortest: Spread, interval: f64) -> Option<Measured> {
-        let [_, middle, longest] = SHARES;
-        let last = self.factor(longest * interval)?;
-        if last.median >= 1.0 {
-            return Some(Measured { seconds: longest, sigma: BOUNDED * longest });
-        }
-        Some(crossing([shortest, self.factor(middle * interval)?, last]))
     }
 
     /// Motion within the rows over that which the poses give, when rows take `readout` seconds.
@@ -96,10 +86,14 @@ pub(super) fn depth_readout(readout: f64, longer: f64) -> f64 {
     if depth * readout > 0.0 { depth } else { 0.0 }
 }
 
-/// Share of the time between frames at which the factors of [`SHARES`] fall below 1, with its standard deviation. The last one
-/// is below 1.
-fn crossing([shortest, middle, longest]: [Spread; 3]) -> Measured {
+/// Share of the time between frames at which the factors of [`SHARES`] fall below 1, with its standard deviation, or the longest
+/// where they do not. The middle one is only asked for if they do.
+fn crossing(shortest: Spread, longest: Spread, middle: impl FnOnce() -> Option<Spread>) -> Option<Measured> {
     let [first, second, last] = SHARES;
+    if longest.median >= 1.0 {
+        return Some(Measured { seconds: last, sigma: BOUNDED * last });
+    }
+    let middle = middle()?;
     let (before, after, start, length) = if middle.median < 1.0 {
         (shortest, middle, first, second - first)
     } else {
@@ -108,25 +102,30 @@ fn crossing([shortest, middle, longest]: [Spread; 3]) -> Measured {
     let slope = (before.median - after.median) / length;
     let share = start + (before.median - 1.0) / slope;
     let sigma = (before.sigma.max(after.sigma) / slope).hypot(SYSTEMATIC * share);
-    Measured { seconds: share, sigma }
+    Some(Measured { seconds: share, sigma })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn factors(values: [f64; 3]) -> [Spread; 3] {
-        values.map(|median| Spread { median, sigma: 0.03 })
+    /// The crossing of three factors, from the shortest share to the longest.
+    fn crossing_of(values: [f64; 3]) -> Option<Measured> {
+        let [shortest, middle, longest] = values.map(|median| Spread { median, sigma: 0.03 });
+        crossing(shortest, longest, || Some(middle))
     }
 
     #[test]
     fn the_readout_is_where_rows_and_poses_agree() {
-        let found = crossing(factors([1.3, 1.1, 0.9]));
+        let found = crossing_of([1.3, 1.1, 0.9]).unwrap();
         assert!((found.seconds - 0.775).abs() < 1e-12, "{found:?}");
         // 0.03 over a slope of 0.2 in 0.35, and a twentieth.
         assert!((found.sigma - 0.0525_f64.hypot(0.05 * 0.775)).abs() < 1e-12, "{found:?}");
-        let found = crossing(factors([1.3, 0.9, 0.7]));
+        let found = crossing_of([1.3, 0.9, 0.7]).unwrap();
         assert!((found.seconds - 0.525).abs() < 1e-12, "{found:?}");
+        assert_eq!(crossing_of([1.5, 1.3, 1.1]).unwrap().seconds, 0.95);
+        let [more, less] = [1.3, 0.9].map(|median| Spread { median, sigma: 0.03 });
+        assert_eq!(crossing(more, less, || None), None);
     }
 
     #[test]

@@ -94,7 +94,7 @@ impl<'m> DeblurScratch<'m> {
         iterations: usize,
         sharp: &mut [f32],
     ) -> DeblurReport {
-        let views = ((longest / TAP_SPACING) as usize + 2).clamp(3, MAX_VIRTUAL_VIEWS);
+        let views = tap_count(longest);
         sharp.copy_from_slice(self.captured);
         let residual_before = self.compare(level, views, sharp);
         let mut residual_after = residual_before;
@@ -123,6 +123,13 @@ impl<'m> DeblurScratch<'m> {
 
 /// Distance between neighbouring taps along the longest path, pixels.
 const TAP_SPACING: f32 = 1.5;
+
+/// Samples of every blur path of an image whose longest has `longest` pixels, for [`blur_along`]: 3 to [`MAX_VIRTUAL_VIEWS`].
+#[must_use]
+pub fn tap_count(longest: f32) -> usize {
+    // Casts saturate.
+    ((longest / TAP_SPACING) as usize).saturating_add(2).clamp(3, MAX_VIRTUAL_VIEWS)
+}
 
 /// Replaces reblurred light by the ratio captured/reblurred; returns the sum of squared differences.
 #[inline(always)]

@@ -24,6 +24,9 @@ const REACH: usize = 3;
 const NOISE_LEVELS: usize = 16;
 const FEWEST_PIXELS: usize = 200;
 
+/// Step between the rows and columns that are looked at for it: a quarter of the pixels has the same noise.
+const NOISE_STEP: usize = 2;
+
 /// The quarter of the pixels with the least second differences has little but noise: as a share of its standard deviation
 /// (the first quartile of the magnitude of a normal variable).
 const QUARTILE: f32 = 0.3186;
@@ -37,8 +40,11 @@ const LEAST_NOISE: f32 = 3e-5;
 /// Blur, pixels, up to which all detail counts and from which on none does: what a long blur leaves is little, and a small error
 /// of its path shows as edges that are not there. Less where the blurred picture is not rendered: it is wrong at the edges
 /// of near things.
-const TRUSTED_BLUR: [f32; 2] = [4.0, 16.0];
+const TRUSTED_BLUR: [f32; 2] = [4.0, LONGEST_BLUR];
 const TRUSTED_FLOW: [f32; 2] = [2.0, 8.0];
+
+/// Blur from which on there is no detail to bring back, pixels.
+pub const LONGEST_BLUR: f32 = 16.0;
 
 /// The map says nothing about a pixel of which it covers less.
 const KNOWN_ALPHA: f32 = 0.6;
@@ -167,17 +173,21 @@ impl Blur<'_> {
                 .collect();
             found.iter_mut().zip(self.along(&rest)).for_each(|(light, more)| *light += more);
         }
-        found.iter_mut().enumerate().for_each(|(pixel, light)| *light *= self.trust(pixel));
+        self.fade(&mut found);
         found
     }
 
-    /// How much of the detail at a pixel counts, by the length of its blur.
-    fn trust(&self, pixel: usize) -> f32 {
-        let (u, v) = (pixel % self.flow.width, pixel / self.flow.width);
-        let block = v / BLOCK_HEIGHT * self.flow.blocks_per_row() + u / BLOCK_WIDTH;
-        let [x, y] = self.flow.displacement[block];
+    /// Multiplies detail by how much of it counts, by the length of the blur of its block.
+    fn fade(&self, detail: &mut [f32]) {
         let [whole, none] = self.trusted;
-        ((none - x.hypot(y)) / (none - whole)).clamp(0.0, 1.0)
+        let trust = |[x, y]: &[f32; 2]| ((none - x.hypot(*y)) / (none - whole)).clamp(0.0, 1.0);
+        let trust: Vec<f32> = self.flow.displacement.iter().map(trust).collect();
+        for (v, row) in detail.chunks_mut(self.flow.width).enumerate() {
+            let blocks = &trust[v / BLOCK_HEIGHT * self.flow.blocks_per_row()..];
+            for (block, trust) in row.chunks_mut(BLOCK_WIDTH).zip(blocks) {
+                block.iter_mut().for_each(|light| *light *= trust);
+            }
+        }
     }
 }
 
@@ -218,8 +228,8 @@ fn noise(
 ) -> [f32; NOISE_LEVELS] {
     let mut magnitudes: [Vec<f32>; NOISE_LEVELS] = Default::default();
     for (channel, plane) in captured.iter().enumerate() {
-        for row in 1..(plane.len() / width).saturating_sub(1) {
-            for column in 1..width - 1 {
+        for row in (1..(plane.len() / width).saturating_sub(1)).step_by(NOISE_STEP) {
+            for column in (1..width - 1).step_by(NOISE_STEP) {
                 let at = row * width + column;
                 let along = |at: usize| plane[at - 1] - 2.0 * plane[at] + plane[at + 1];
                 let second = along(at - width) - 2.0 * along(at) + along(at + width);
@@ -237,16 +247,26 @@ fn noise(
     })
 }
 
-/// Mean over a window of [`REACH`] pixels to either side, as far as it lies in the image.
+/// Mean over a window of [`REACH`] pixels to either side, as far as it lies in the image: along rows, then along columns.
 fn window_mean(image: &[f32], width: usize) -> Vec<f32> {
     let height = image.len() / width;
-    let mean = |image: &[f32], count: usize, place: &dyn Fn(usize) -> usize, index: usize| {
-        let (first, last) = (index.saturating_sub(REACH), (index + REACH).min(count - 1));
-        (first..=last).map(|k| image[place(k)]).sum::<f32>() / (last - first + 1) as f32
-    };
-    let pixels = || (0..width * height).map(|pixel| (pixel % width, pixel / width));
-    let along: Vec<f32> = pixels().map(|(u, v)| mean(image, width, &|k| v * width + k, u)).collect();
-    pixels().map(|(u, v)| mean(&along, height, &|k| k * width + u, v)).collect()
+    let mut along = vec![0.0; image.len()];
+    for (row, means) in image.chunks(width).zip(along.chunks_mut(width)) {
+        for (u, mean) in means.iter_mut().enumerate() {
+            let window = &row[u.saturating_sub(REACH)..(u + REACH + 1).min(width)];
+            *mean = window.iter().sum::<f32>() / window.len() as f32;
+        }
+    }
+    let mut means = vec![0.0; image.len()];
+    for (v, means) in means.chunks_mut(width).enumerate() {
+        let rows = v.saturating_sub(REACH)..(v + REACH + 1).min(height);
+        let share = 1.0 / rows.len() as f32;
+        for row in rows {
+            let row = &along[row * width..][..width];
+            means.iter_mut().zip(row).for_each(|(mean, value)| *mean += share * value);
+        }
+    }
+    means
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ mod encode;
 mod keyframe;
 mod run_keyframes;
 
-pub use detail::Reblurred;
+pub use detail::{LONGEST_BLUR, Reblurred};
 pub use encode::ForwardResponse;
 pub use keyframe::{DeblurError, DeblurMemory, Deblurred, KeyframeDeblurrer};
 pub use run_keyframes::write_deblurred_keyframes;

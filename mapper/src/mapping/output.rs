@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::prepare::Frames;
 use crate::bundle::BundleAdjustment;
 use crate::dataset::{Dataset, RgbdFrame};
-use crate::deblurring::{DeblurMemory, KeyframeDeblurrer, Reblurred};
+use crate::deblurring::{DeblurMemory, KeyframeDeblurrer, LONGEST_BLUR, Reblurred};
 use crate::rendering::{Behind, ViewRenderer};
 use crate::run::{RunError, RunWriter};
 use crate::tracking::{TrackingOptions, tracker_config};
@@ -47,14 +47,14 @@ pub(super) fn write(
     let count = bundle.keyframes().len();
     for first in (0..count).step_by(TOGETHER) {
         let keyframes = first..count.min(first + TOGETHER);
-        let explained: Vec<_> = keyframes.map(|k| (k, bundle.explained(k))).collect();
+        let explained: Vec<_> = keyframes.map(|k| (k, explained(bundle, k))).collect();
         let pictures = Pictures { dataset, bundle: &*bundle, refined, deblurrer: &deblurrer };
         let shared = &*writer;
         let written: Vec<Result<(), RunError>> = explained
             .into_par_iter()
             .map_init(
                 || (pictures.renderer(), deblurrer.memory()),
-                |memory, (k, reblurred)| pictures.write(shared, k, reblurred.as_ref(), memory),
+                |memory, (k, explained)| pictures.write(shared, k, &explained, memory),
             )
             .collect();
         for outcome in written {
@@ -63,6 +63,22 @@ pub(super) fn write(
         }
     }
     Ok(())
+}
+
+/// What the picture of keyframe `k` is compared with to find detail.
+enum Explained {
+    /// Its blur is too long for any.
+    Nothing,
+    /// The map's picture, blurred as the map renders it, or along the flow.
+    Picture(Option<Reblurred>),
+}
+
+fn explained(bundle: &mut BundleAdjustment, k: usize) -> Explained {
+    if bundle.blur_px(k) < f64::from(LONGEST_BLUR) {
+        Explained::Picture(bundle.explained(k))
+    } else {
+        Explained::Nothing
+    }
 }
 
 /// What the pictures of keyframes are made of.
@@ -86,7 +102,7 @@ impl<'a> Pictures<'a> {
         &self,
         writer: &RunWriter,
         k: usize,
-        reblurred: Option<&Reblurred>,
+        explained: &Explained,
         (renderer, memory): &mut (ViewRenderer<'_>, DeblurMemory),
     ) -> Result<(), RunError> {
         let (keyframe, frame) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
@@ -94,6 +110,9 @@ impl<'a> Pictures<'a> {
         let behind = Behind::Captured { colour, gain: frame.log_gain.exp() as f32 };
         let view = renderer.render(&frame.path.mid(), behind);
         writer.write_depth(keyframe.index, view.size, &view.depth)?;
+        let Explained::Picture(reblurred) = explained else {
+            return writer.write_deblurred(keyframe.index, view.size, view.rgb);
+        };
         let captured = RgbdFrame {
             timestamp: self.dataset.timestamp(keyframe.index),
             depth_timestamp: self.dataset.depth_timestamp(keyframe.index),
@@ -103,8 +122,10 @@ impl<'a> Pictures<'a> {
         let (exposure, _) = &self.refined[keyframe.index];
         let shown = view.rgb.clone();
         // Observations have the size of the camera, and the memory is for it; else the map's picture stays.
-        let rgb =
-            self.deblurrer.with_detail(&captured, exposure, shown, reblurred, memory).unwrap_or(view.rgb);
+        let rgb = self
+            .deblurrer
+            .with_detail(&captured, exposure, shown, reblurred.as_ref(), memory)
+            .unwrap_or(view.rgb);
         writer.write_deblurred(keyframe.index, view.size, rgb)
     }
 }

@@ -10,7 +10,7 @@ use mba_tracker::deblur::DeblurScratch;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::GreyPyramid;
 use mba_tracker::keyframe::Keyframe;
-use mba_tracker::photometric::LuminanceTable;
+use mba_tracker::photometric::{LuminanceTable, Vignetting};
 use mba_tracker::surface::InverseDepthMap;
 use mba_tracker::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use mba_tracker::transfer::RowBand;
@@ -35,11 +35,13 @@ fn stages(c: &mut Criterion) {
     let mut pyramid = GreyPyramid::carve(&mut arena, &config.camera, config.levels).expect("memory");
     let mut depth = InverseDepthMap::carve(&mut arena, &config.camera, config.surface_level).expect("memory");
     let mut keyframe = keyframe(&mut arena, config);
-    c.bench_function("pyramid fill", |b| b.iter(|| pyramid.fill(&frame.colour, &luminance)));
+    c.bench_function("pyramid fill", |b| {
+        b.iter(|| pyramid.fill(&frame.colour, &luminance, &Vignetting::NONE))
+    });
     c.bench_function("depth block mean", |b| {
         b.iter(|| depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit))
     });
-    keyframe.pyramid.fill(&frame.colour, &luminance);
+    keyframe.pyramid.fill(&frame.colour, &luminance, &Vignetting::NONE);
     keyframe.depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit);
     c.bench_function("plane fit", |b| b.iter(|| keyframe.restart_surface(SimdLevel::new())));
     c.bench_function("keypoint selection, all levels", |b| {
@@ -70,7 +72,7 @@ fn deblurring(c: &mut Criterion) {
     let mut memory = vec![0; MEMORY];
     let mut arena = Arena::new(&mut memory);
     let mut keyframe = keyframe(&mut arena, config);
-    keyframe.pyramid.fill(&frame.colour, &LuminanceTable::new(&config.response));
+    keyframe.pyramid.fill(&frame.colour, &LuminanceTable::new(&config.response), &Vignetting::NONE);
     keyframe.depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit);
     keyframe.restart_surface(SimdLevel::new());
     let mut scratch =

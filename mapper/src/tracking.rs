@@ -66,6 +66,7 @@ pub(crate) fn reduced_tracker_config(
     let metres_per_unit = (1.0 / calibration.depth_scale) as f32;
     let camera = calibration.camera.at_level(level);
     let mut config = TrackerConfig::new(camera, metres_per_unit, calibration.response.inverse());
+    config.vignetting = dataset.vignetting();
     config.region = dataset.region_with_source().at_level(level);
     config.reference = options.reference;
     config.align.blur = options.blur;

@@ -125,6 +125,11 @@ typedef struct {
   double readout_seconds;
   // Seconds from the first row of a depth image to the last, -0.1 to 0.1.
   double depth_readout_seconds;
+  // Light falls off as `1 + a2 r^2 + a4 r^4`, above 0, with `r` = 1 at the centre of a corner pixel; 0 and 0 for a lens
+  // without fall-off.
+  double vignetting_a2;
+  // See `vignetting_a2`.
+  double vignetting_a4;
   // `MBA_REFERENCE_*`.
   int32_t reference;
   // `MBA_EFFORT_*`.

@@ -30,7 +30,17 @@ struct Result {
 /// Bad input when the data set cannot be used or the file not be written.
 pub fn run(args: &Calibrate, console: &Console) -> anyhow::Result<()> {
     let recorded = open::dataset(&args.dataset)?;
+    let was_complete = self_calibration::is_complete(&recorded);
     let (mut dataset, mut findings) = self_calibration::complete(recorded)?;
+    if was_complete && dataset.calibration().sources.vignetting == Knowledge::Assumed {
+        let (finding, found) = self_calibration::vignetting(&dataset);
+        findings.push(finding);
+        if let Some(vignetting) = found {
+            let mut calibration = dataset.calibration().clone();
+            (calibration.vignetting, calibration.sources.vignetting) = (vignetting, Knowledge::Estimated);
+            dataset = dataset.with_calibration(calibration)?;
+        }
+    }
     if args.focal_length {
         let (finding, factor) = self_calibration::focal_length(&dataset);
         findings.push(finding);

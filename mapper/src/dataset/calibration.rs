@@ -1,11 +1,10 @@
 //! What has to be known about the camera, and checks that it makes sense.
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
-use mba_tracker::photometric::InverseResponse;
+use mba_tracker::photometric::{InverseResponse, Vignetting};
 use nalgebra::{Matrix3, Rotation3};
 
 use super::knowledge::{CalibrationSources, CameraFact, Knowledge};
-use super::vignetting::Vignetting;
 
 /// Everything known about the camera of a data set.
 #[derive(Clone, Debug, PartialEq)]

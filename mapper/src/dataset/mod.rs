@@ -52,10 +52,10 @@ pub use exposure_list::{read_exposure_times, write_exposure_times};
 pub use frame::RgbdFrame;
 pub use frame::read_image;
 pub use knowledge::{CalibrationSources, CameraFact, Knowledge};
+pub use mba_tracker::photometric::Vignetting;
 pub(crate) use response_table::to_text as response_text;
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
-pub use vignetting::Vignetting;
 
 /// How a data set is opened.
 #[derive(Clone, Copy, Debug, PartialEq)]

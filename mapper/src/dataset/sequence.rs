@@ -7,12 +7,13 @@ use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::image::{
     PixelRectangle, SourcePosition, fill_source_map, region_with_source, remap_bilinear, remap_nearest,
 };
+use mba_tracker::photometric::{Vignetting, radius_squared};
 
 use super::calibration::{
     ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, assumed_exposure_seconds, check_exposure,
 };
 use super::frame::{image_size, read_colour, read_depth};
-use super::vignetting::falloff_of_pixels;
+use super::vignetting::{falloff_of_frames, falloff_of_pixels};
 use super::{
     Calibration, CameraFact, DatasetError, ExposureSource, FrameError, InvalidValue, Knowledge, RgbdFrame,
     Warning,
@@ -290,6 +291,26 @@ impl Dataset {
         let source = self.colour.map.as_deref();
         (self.colour.is_there && !vignetting.is_none())
             .then(|| falloff_of_pixels(vignetting, camera, self.colour.size, source))
+    }
+
+    /// Squared distance of a pixel of the frames from the middle of the stored image, where it is 1 in the corners. A pixel
+    /// outside of the frames counts as the nearest inside.
+    pub(crate) fn stored_radius_squared(&self, u: f64, v: f64) -> f64 {
+        let PinholeCamera { width, height, .. } = self.calibration.camera;
+        let nearest = |pixel: f64, side: usize| pixel.round().clamp(0.0, side as f64 - 1.0) as usize;
+        let place = match self.colour.map.as_deref() {
+            Some(map) => map[nearest(v, height) * width + nearest(u, width)].map(f64::from),
+            None => [u, v],
+        };
+        radius_squared(self.colour.size.0, self.colour.size.1, place[0], place[1])
+    }
+
+    /// The fall-off of light over the frames as a polynomial of the distance from their middle: that of the calibration, for
+    /// frames without the distortion of the stored image the nearest one.
+    #[must_use]
+    pub fn vignetting(&self) -> Vignetting {
+        let Calibration { vignetting, camera, .. } = &self.calibration;
+        falloff_of_frames(vignetting, camera, self.colour.size, self.colour.map.as_deref())
     }
 
     /// Whatever is odd about the data set.

@@ -1,53 +1,8 @@
-//! Light that falls off towards the corners of the image.
+//! Fall-off of light over the frames of a data set, which may be stored with distortion.
 
 use mba_tracker::geometry::PinholeCamera;
-
-/// The share of light that reaches the sensor at distance `r` from the middle of the stored image:
-/// `1 + a2 r^2 + a4 r^4`, where `r` is 1 at the centre of a corner pixel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Vignetting {
-    /// Coefficient of the squared distance.
-    pub a2: f64,
-    /// Coefficient of its square.
-    pub a4: f64,
-}
-
-impl Vignetting {
-    /// The same light everywhere.
-    pub const NONE: Self = Self { a2: 0.0, a4: 0.0 };
-
-    /// Whether the light is the same everywhere.
-    #[must_use]
-    pub fn is_none(&self) -> bool {
-        *self == Self::NONE
-    }
-
-    /// Share of the light at a squared distance from the middle, 1 in the corner.
-    #[must_use]
-    pub fn falloff(&self, radius_squared: f64) -> f64 {
-        1.0 + radius_squared * (self.a2 + radius_squared * self.a4)
-    }
-
-    /// Share of the light at pixel `(u, v)` of a stored image of this size; pixel centres are at whole numbers.
-    #[must_use]
-    pub fn falloff_at(&self, width: usize, height: usize, u: f64, v: f64) -> f64 {
-        let (centre_u, centre_v) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
-        let corner = centre_u * centre_u + centre_v * centre_v;
-        let (across, down) = (u - centre_u, v - centre_v);
-        // An image of one pixel has no corners.
-        if corner > 0.0 { self.falloff((across * across + down * down) / corner) } else { 1.0 }
-    }
-
-    /// Least share of the light anywhere in the image; no number if a coefficient is none.
-    pub(crate) fn least(&self) -> f64 {
-        if !(self.a2.is_finite() && self.a4.is_finite()) {
-            return f64::NAN;
-        }
-        let ends = self.falloff(0.0).min(self.falloff(1.0));
-        let turn = -self.a2 / (2.0 * self.a4);
-        if (0.0..=1.0).contains(&turn) { ends.min(self.falloff(turn)) } else { ends }
-    }
-}
+use mba_tracker::photometric::{Vignetting, radius_squared};
+use nalgebra::{Matrix2, Vector2};
 
 /// The share of light at each pixel of frames of `ideal`, of which `source` gives the place in the stored image of
 /// size `stored`; nothing for frames that are as stored. A place outside that image counts as the nearest inside.
@@ -67,31 +22,54 @@ pub(super) fn falloff_of_pixels(
     (0..ideal.width * ideal.height).map(at).collect()
 }
 
+/// Pixels from one sample of [`falloff_of_frames`] to the next, along rows and columns.
+const SAMPLE_STEP: usize = 16;
+
+/// The fall-off over frames of `ideal`, of which `source` gives the place in the stored image of size `stored`, as a
+/// polynomial of the distance in the frames: that of the stored image where they are as stored, else the nearest one.
+pub(super) fn falloff_of_frames(
+    vignetting: &Vignetting,
+    ideal: &PinholeCamera,
+    stored: (usize, usize),
+    source: Option<&[[f32; 2]]>,
+) -> Vignetting {
+    let Some(map) = source.filter(|_| !vignetting.is_none()) else { return *vignetting };
+    let (mut normal, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    for v in (0..ideal.height).step_by(SAMPLE_STEP) {
+        for u in (0..ideal.width).step_by(SAMPLE_STEP) {
+            let [from_u, from_v] = map[v * ideal.width + u].map(f64::from);
+            let is_inside =
+                (0.0..stored.0 as f64).contains(&from_u) && (0.0..stored.1 as f64).contains(&from_v);
+            if is_inside {
+                let squared = radius_squared(ideal.width, ideal.height, u as f64, v as f64);
+                let powers = Vector2::new(squared, squared * squared);
+                normal += powers * powers.transpose();
+                right += powers * (vignetting.falloff_at(stored.0, stored.1, from_u, from_v) - 1.0);
+            }
+        }
+    }
+    let fitted = normal.try_inverse().map(|inverse| inverse * right);
+    let fitted = fitted.map_or(*vignetting, |a| Vignetting { a2: a.x, a4: a.y });
+    // Beyond the samples the polynomial may do as it likes; light that falls to nothing cannot be given back.
+    if fitted.least() > 0.0 { fitted } else { *vignetting }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn corner_pixels_are_at_radius_one_and_the_middle_has_all_light() {
+    fn frames_without_the_border_of_the_stored_image_see_less_of_the_fall_off() {
+        let ideal = PinholeCamera { width: 320, height: 240, fx: 300.0, fy: 300.0, cx: 159.5, cy: 119.5 };
         let lens = Vignetting { a2: -0.35, a4: 0.05 };
-        for (u, v) in [(0.0, 0.0), (639.0, 0.0), (0.0, 479.0), (639.0, 479.0)] {
-            assert!((lens.falloff_at(640, 480, u, v) - 0.7).abs() < 1e-12);
-        }
-        assert_eq!(lens.falloff_at(640, 480, 319.5, 239.5), 1.0);
-        // The middle of the left edge: r^2 = 319.5^2 / (319.5^2 + 239.5^2) = 0.64024.
-        let expected = 1.0 - 0.35 * 0.640_240 + 0.05 * 0.409_907;
-        assert!((lens.falloff_at(640, 480, 0.0, 239.5) - expected).abs() < 1e-6);
-        assert_eq!(lens.falloff_at(1, 1, 0.0, 0.0), 1.0);
-    }
-
-    #[test]
-    fn least_light_may_lie_between_middle_and_corner() {
-        // 1 - 2 s + s^2 is zero at s = 1; 1 - 3 s + 2 s^2 is -1/8 at s = 3/4.
-        assert_eq!(Vignetting { a2: -2.0, a4: 1.0 }.least(), 0.0);
-        assert_eq!(Vignetting { a2: -3.0, a4: 2.0 }.least(), -0.125);
-        assert_eq!(Vignetting { a2: -0.5, a4: 0.1 }.least(), 0.6);
-        assert_eq!(Vignetting { a2: 0.5, a4: 0.1 }.least(), 1.0);
-        assert_eq!(Vignetting::NONE.least(), 1.0);
-        assert!(Vignetting { a2: f64::NAN, a4: 0.0 }.least().is_nan());
+        assert_eq!(falloff_of_frames(&lens, &ideal, (320, 240), None), lens);
+        // Frames that show the middle of the stored image, twice as large.
+        let place = |pixel: usize| {
+            let (u, v) = ((pixel % 320) as f32, (pixel / 320) as f32);
+            [159.5 + 0.5 * (u - 159.5), 119.5 + 0.5 * (v - 119.5)]
+        };
+        let map: Vec<[f32; 2]> = (0..320 * 240).map(place).collect();
+        let seen = falloff_of_frames(&lens, &ideal, (320, 240), Some(&map));
+        assert!((seen.a2 + 0.35 / 4.0).abs() < 1e-6 && (seen.a4 - 0.05 / 16.0).abs() < 1e-6, "{seen:?}");
     }
 }

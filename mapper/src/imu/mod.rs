@@ -16,8 +16,10 @@
 //! `imu_from_camera` of `calibration.toml` takes the axes of the camera to those of the files. Without it they are
 //! the same, but for `accelerometer.txt`: the Kinect's accelerometer has x left, y up, z forward.
 
+mod gravity;
 mod read;
 mod recording;
 
+pub use gravity::{InertialFit, inertial_fit};
 pub(crate) use read::read_folder;
 pub use recording::{ImuRecording, LONGEST_GAP, TimedVector};

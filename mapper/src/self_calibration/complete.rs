@@ -8,6 +8,7 @@ use super::exposure_times::{ExposureSearch, ExposureTimes, Exposures, SHORTEST};
 use super::finding::{Finding, Value};
 use super::readout::{ReadoutSearch, depth_readout};
 use super::robust::median;
+use super::vignetting::{FallOff, fall_off};
 use super::window::{Guess, Probe, Recording, Resolution, Window};
 use crate::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
 use crate::tracking::TrackingOptions;
@@ -75,6 +76,8 @@ struct Estimates {
     longer_than_depth: Option<Measured>,
     /// Pixels that depth lies beside colour; none where the picture does not tell.
     depth_shift: Option<[f64; 2]>,
+    /// Fall-off of light; none where it is on record or nothing tells.
+    fall_off: Option<FallOff>,
     /// Whether the frames say anything about the readout.
     readout_was_sought: bool,
 }
@@ -90,6 +93,7 @@ impl Estimates {
             depth_delay: None,
             longer_than_depth: None,
             depth_shift: None,
+            fall_off: None,
             readout_was_sought: !readout_known,
         };
         let Some(depth) = survey(dataset, DEPTH_SAMPLES).median_depth.filter(|_| dataset.len() >= MIN_FRAMES)
@@ -114,6 +118,9 @@ impl Estimates {
         // The second look knows the motion better.
         probe = settled.unwrap_or(probe);
         probe.guess = found.look_at_edges(&window, &probe);
+        if calibration.sources.vignetting == Knowledge::Assumed {
+            found.fall_off = fall_off(&window, &probe.tracked);
+        }
         if exposures_are_told {
             found.exposures = search.fine(probe);
         }
@@ -175,6 +182,10 @@ impl Estimates {
             calibration.depth_clock_seconds = found.seconds;
             calibration.sources.depth_delay = Knowledge::Estimated;
         }
+        if let Some(found) = self.fall_off.filter(FallOff::is_worth_it) {
+            calibration.vignetting = found.vignetting;
+            calibration.sources.vignetting = Knowledge::Estimated;
+        }
         if !exposure_known && self.exposures == Exposures::NoMotion {
             calibration.exposure = ExposureSource::Assumed { seconds: SHORTEST };
         }
@@ -194,6 +205,7 @@ impl Estimates {
             findings.push(self.readout_finding(dataset.calibration()));
         }
         findings.extend(self.delay_finding());
+        findings.extend(self.fall_off.as_ref().map(FallOff::finding));
         findings.extend(self.shift_finding(&dataset.calibration().camera));
         findings
     }

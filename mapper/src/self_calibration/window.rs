@@ -241,6 +241,13 @@ impl<'a> Window<'a> {
         self.recording.dataset.calibration().camera.at_level(self.recording.level(Resolution::Fine))
     }
 
+    /// Squared distance of a pixel of the fine frames from the middle of the stored image, 1 in its corners.
+    pub(super) fn stored_radius_squared(&self, [u, v]: [f64; 2]) -> f64 {
+        let level = self.recording.level(Resolution::Fine);
+        let at = |pixel: f64| f64::from(PinholeCamera::pixel_at_level(pixel as f32, level, 0));
+        self.recording.dataset.stored_radius_squared(at(u), at(v))
+    }
+
     /// Tracks the window with a supposed camera.
     pub(super) fn probe(&self, resolution: Resolution, guess: Guess) -> Probe {
         let frames = match resolution {

@@ -10,7 +10,7 @@ use mba_tracker::align::{
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::image::{ColourView, DepthView, GreyPyramid, PixelFormat, PixelRectangle};
 use mba_tracker::keyframe::{Keyframe, MAX_KEYPOINTS};
-use mba_tracker::photometric::{InverseResponse, LuminanceTable};
+use mba_tracker::photometric::{InverseResponse, LuminanceTable, Vignetting};
 use mba_tracker::surface::InverseDepthMap;
 use mba_tracker::trajectory::{ExposureTrajectory, FrameTiming};
 use mba_tracker::transfer::{BrightnessModel, PatchCost, PatchSite};
@@ -51,7 +51,7 @@ impl Images {
     fn fill(&self, pyramid: &mut GreyPyramid, depth: &mut InverseDepthMap) {
         let PinholeCamera { width, height, .. } = camera();
         let colour = ColourView::new(&self.grey, width, height, width, PixelFormat::Grey8).expect("grey");
-        pyramid.fill(&colour, &LuminanceTable::new(&InverseResponse::linear()));
+        pyramid.fill(&colour, &LuminanceTable::new(&InverseResponse::linear()), &Vignetting::NONE);
         let raw = DepthView::new(&self.depth, width, height, width).expect("depth");
         depth.fill(SimdLevel::new(), &raw, (1.0 / DEPTH_SCALE) as f32);
     }

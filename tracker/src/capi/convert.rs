@@ -12,7 +12,7 @@ use super::types::{MbaConfig, MbaDepth, MbaFrame, MbaImage, MbaPose, MbaResult};
 use crate::align::UNKNOWNS;
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::{ColourView, DepthView, PixelFormat};
-use crate::photometric::InverseResponse;
+use crate::photometric::{InverseResponse, Vignetting};
 use crate::{Effort, Frame, FrameResult, FrameStatus, Readout, ReferenceMode, ReferenceView, TrackerConfig};
 
 /// The configuration that C asks for, checked.
@@ -56,6 +56,7 @@ pub(super) unsafe fn config(c: &MbaConfig) -> Result<TrackerConfig, i32> {
         surface_level: c.surface_level as usize,
         recent_keyframes: c.recent_keyframes as usize,
         readout,
+        vignetting: Vignetting { a2: c.vignetting_a2, a4: c.vignetting_a4 },
         reference,
         ..TrackerConfig::new(camera, c.metres_per_unit, response).with_effort(effort)
     };
@@ -81,6 +82,8 @@ pub(super) fn settings(config: &TrackerConfig) -> MbaConfig {
         depth_apart: u32::from(config.readout.depth_apart),
         readout_seconds: config.readout.colour,
         depth_readout_seconds: config.readout.depth,
+        vignetting_a2: config.vignetting.a2,
+        vignetting_a4: config.vignetting.a4,
         reference: match config.reference {
             ReferenceMode::Deblurred => MBA_REFERENCE_DEBLURRED,
             ReferenceMode::Raw => MBA_REFERENCE_RAW,

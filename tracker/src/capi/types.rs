@@ -35,6 +35,11 @@ pub struct MbaConfig {
     pub readout_seconds: f64,
     /// Seconds from the first row of a depth image to the last, -0.1 to 0.1.
     pub depth_readout_seconds: f64,
+    /// Light falls off as `1 + a2 r^2 + a4 r^4`, above 0, with `r` = 1 at the centre of a corner pixel; 0 and 0 for a lens
+    /// without fall-off.
+    pub vignetting_a2: f64,
+    /// See `vignetting_a2`.
+    pub vignetting_a4: f64,
     /// `MBA_REFERENCE_*`.
     pub reference: i32,
     /// `MBA_EFFORT_*`.

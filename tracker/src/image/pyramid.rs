@@ -4,7 +4,7 @@ use arrayvec::ArrayVec;
 
 use super::view::{ColourView, PixelFormat};
 use crate::geometry::PinholeCamera;
-use crate::photometric::LuminanceTable;
+use crate::photometric::{LuminanceTable, Vignetting};
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Upper bound of pyramid levels.
@@ -78,11 +78,14 @@ impl<'m> GreyPyramid<'m> {
         Ok(pyramid)
     }
 
-    /// Fills all levels from an encoded image of the size of level 0.
-    pub fn fill(&mut self, colour: &ColourView, luminance: &LuminanceTable) {
+    /// Fills all levels from an encoded image of the size of level 0, with the light that `vignetting` took given back.
+    pub fn fill(&mut self, colour: &ColourView, luminance: &LuminanceTable, vignetting: &Vignetting) {
         let Some(finest) = self.levels.first_mut() else { return };
         for (v, row) in finest.pixels.chunks_exact_mut(finest.width).enumerate() {
             linearise_row(colour.row(v), colour.format(), luminance, row);
+            if !vignetting.is_none() {
+                vignetting.restore_row(row, v, finest.height);
+            }
         }
         self.reduce();
     }
@@ -139,7 +142,7 @@ mod tests {
         let mut pyramid = GreyPyramid::carve(&mut Arena::new(&mut memory), &CAMERA, 4).expect("memory");
         let bytes: Vec<u8> = (0..48 * 32).map(|k| (3 * (k % 48) + 2 * (k / 48)) as u8).collect();
         let view = ColourView::new(&bytes, 48, 32, 48, PixelFormat::Grey8).expect("a view");
-        pyramid.fill(&view, &LuminanceTable::new(&InverseResponse::linear()));
+        pyramid.fill(&view, &LuminanceTable::new(&InverseResponse::linear()), &Vignetting::NONE);
         for (level, image) in pyramid.levels.iter().enumerate() {
             // A ramp is linear in the image, so its block mean is its value at the block's centre.
             for (k, light) in image.pixels.iter().enumerate() {
@@ -167,7 +170,7 @@ mod tests {
         let mut pyramid = GreyPyramid::carve(&mut Arena::new(&mut memory), &camera, 1).expect("memory");
         let bytes = [255, 255, 255, 0, 0, 0, 9, 9, 0, 255, 0, 255, 0, 0];
         let view = ColourView::new(&bytes, 2, 2, 8, PixelFormat::Rgb8).expect("a view");
-        pyramid.fill(&view, &LuminanceTable::new(&InverseResponse::linear()));
+        pyramid.fill(&view, &LuminanceTable::new(&InverseResponse::linear()), &Vignetting::NONE);
         for (light, expected) in pyramid.levels[0].pixels.iter().zip([1.0, 0.0, 0.7152, 0.2126]) {
             assert!((light - expected).abs() < 1e-6);
         }

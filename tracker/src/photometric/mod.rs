@@ -1,5 +1,7 @@
-//! The camera's response: from encoded bytes to linear light.
+//! From encoded bytes to the light that came in: the camera's response and the fall-off of its lens.
 
 mod response;
+mod vignetting;
 
 pub use response::{InverseResponse, LuminanceTable};
+pub use vignetting::{Vignetting, radius_squared};

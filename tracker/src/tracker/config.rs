@@ -7,7 +7,7 @@ use crate::error::ConfigError;
 use crate::geometry::PinholeCamera;
 use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
 use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch};
-use crate::photometric::InverseResponse;
+use crate::photometric::{InverseResponse, Vignetting};
 use crate::trajectory::FrameTiming;
 use crate::transfer::{PatchCost, PatchSite};
 use crate::workspace::{ARENA_ALIGNMENT, slice_bytes};
@@ -30,6 +30,9 @@ pub struct TrackerConfig {
     pub metres_per_unit: f32,
     /// Inverse response of the camera.
     pub response: InverseResponse,
+    /// Fall-off of light over the images; some light reaches every pixel. It does not count for views from outside,
+    /// [`super::Tracker::set_reference`].
+    pub vignetting: Vignetting,
     /// Pyramid levels, 2 to 6.
     pub levels: usize,
     /// Pyramid level of the depth maps.
@@ -117,6 +120,7 @@ impl TrackerConfig {
             camera,
             metres_per_unit,
             response,
+            vignetting: Vignetting::NONE,
             levels,
             surface_level,
             region: PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height },
@@ -169,6 +173,7 @@ impl TrackerConfig {
         let coarsest = self.levels.saturating_sub(1).min(16);
         let smallest = (c.width >> coarsest).min(c.height >> coarsest);
         let scale = f64::from(self.metres_per_unit);
+        let least_light = self.vignetting.least();
         let checks = [
             ("width", c.width as f64, size.contains(&c.width), "32 to 8192 pixels"),
             ("height", c.height as f64, size.contains(&c.height), "32 to 8192 pixels"),
@@ -179,6 +184,7 @@ impl TrackerConfig {
             ("region", self.region.right as f64, self.region.right <= c.width, "columns of the image"),
             ("region", self.region.bottom as f64, self.region.bottom <= c.height, "rows of the image"),
             ("metres_per_unit", scale, scale > 0.0 && scale < 1.0, "above 0 and below 1 metre"),
+            ("vignetting", least_light, least_light > 0.0, "above 0 everywhere in the image"),
             ("levels", self.levels as f64, (2..=MAX_LEVELS).contains(&self.levels), "2 to 6"),
             ("levels", self.levels as f64, smallest >= 16, "at least 16 pixels on the coarsest level"),
             (

@@ -5,6 +5,7 @@ use super::history::Motion;
 use super::track::Tracker;
 use crate::error::FrameError;
 use crate::geometry::RigidTransform;
+use crate::photometric::Vignetting;
 use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use crate::transfer::BrightnessModel;
 
@@ -22,7 +23,7 @@ impl Tracker<'_> {
             return Err(FrameError::Pose);
         }
         self.keep_keyframe();
-        self.keyframe.pyramid.fill(&view.colour, &self.luminance);
+        self.keyframe.pyramid.fill(&view.colour, &self.luminance, &Vignetting::NONE);
         self.keyframe.depth.fill(self.simd, &view.depth, self.config.metres_per_unit);
         self.keyframe.world_from_keyframe = view.world_from_camera;
         let still = ExposureTrajectory::still(RigidTransform::identity());

@@ -163,7 +163,7 @@ impl<'m> Tracker<'m> {
     pub fn track(&mut self, frame: &Frame) -> Result<FrameResult, FrameError> {
         self.check(frame)?;
         self.work = Work { image_pixels: self.pixels(), ..Work::none() };
-        self.pyramid.fill(&frame.colour, &self.luminance);
+        self.pyramid.fill(&frame.colour, &self.luminance, &self.config.vignetting);
         self.depth_share = self.depth.fill(self.simd, &frame.depth, self.config.metres_per_unit);
         (self.timing, self.span) = self.config.readout.timing(frame);
         self.gyro = frame.gyro;

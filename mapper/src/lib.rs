@@ -11,6 +11,8 @@
 //! takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can go on. The
 //! result is another [`run`], with a map.
 //!
+//! [`statistics`] summarises lists of figures.
+//!
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
 //! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
@@ -42,6 +44,7 @@ pub mod rendering;
 pub mod run;
 pub mod self_calibration;
 pub mod slam;
+pub mod statistics;
 pub mod surfaces;
 pub mod synth;
 mod text_lines;

@@ -5,7 +5,7 @@ use mba_tracker::photometric::InverseResponse;
 
 use super::loss::CLIPPED;
 use super::observation::Observation;
-use crate::evaluation::quantile;
+use crate::statistics::quantile;
 
 /// Every so many columns and rows a point is compared.
 const STRIDE: usize = 5;

@@ -14,7 +14,7 @@ use super::problem::{Observation, Problem};
 use super::scales::{Sample, typical_derivatives};
 use super::screening::judge;
 use super::spline::{Knots, MEETING_POINTS, Part, Path, meeting_times};
-use crate::evaluation::quantile;
+use crate::statistics::quantile;
 
 /// Frames from which a path tells which of them is wrong.
 pub(super) const FEWEST_FRAMES: usize = 5;

@@ -8,8 +8,8 @@ use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use nalgebra::Vector3;
 
 use super::evidence::Mismatch;
-use crate::evaluation::quantile;
 use crate::exposure::RowTimes;
+use crate::statistics::quantile;
 
 /// Virtual views of each path.
 const VIEWS: usize = 13;

@@ -7,7 +7,7 @@ use super::repair::usual_interval;
 use super::scales::{MEDIAN_NORM_3, Sample, derivative};
 use super::spline::Part;
 use super::{ContinuityFrame, ContinuitySettings};
-use crate::evaluation::quantile;
+use crate::statistics::quantile;
 
 /// Nothing is known more exactly than this, in metres or radians.
 const LEAST_SIGMA: f64 = 1e-4;

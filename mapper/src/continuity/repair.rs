@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::fit::{FEWEST_FRAMES, Fit, Held, Measured, fit};
 use super::frame::validate;
 use super::{ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, Suspicion};
-use crate::evaluation::quantile;
+use crate::statistics::quantile;
 
 /// Frames to either side that a suspected one is compared with.
 const REFERENCES_PER_SIDE: usize = 2;

@@ -5,8 +5,9 @@ use mba_tracker::trajectory::ExposureTrajectory;
 use super::{
     Continuity, ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, PoseNoise, repair_by_evidence,
 };
-use crate::evaluation::{motion_of, quantile};
+use crate::evaluation::motion_of;
 use crate::run::{FrameRecord, FrameStatus};
+use crate::statistics::quantile;
 use crate::trajectory_file::TimedExposure;
 
 /// How much less exactly a frame is known that was aligned with few inliers or a large residual.

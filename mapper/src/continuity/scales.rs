@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use nalgebra::Vector3;
 
 use super::spline::Part;
-use crate::evaluation::quantile;
+use crate::statistics::quantile;
 
 /// Median length of a vector of three standard normal numbers.
 pub(super) const MEDIAN_NORM_3: f64 = 1.538;

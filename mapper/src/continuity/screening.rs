@@ -10,7 +10,7 @@ use super::direction::reversed_exposures;
 use super::fit::{Judgement, Measured};
 use super::scales::{MEDIAN_NORM_3, Sample, derivative, typical_derivatives};
 use super::spline::Part;
-use crate::evaluation::quantile;
+use crate::statistics::quantile;
 
 /// Error of a prediction from both sides, and from one, in units of jerk × (time to the neighbour)³.
 const BRIDGED_ERROR: f64 = 0.05;

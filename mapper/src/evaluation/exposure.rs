@@ -5,7 +5,8 @@ use mba_tracker::trajectory::ExposureTrajectory;
 
 use crate::trajectory_file::TimedExposure;
 
-use super::{associate, quantile};
+use super::associate;
+use crate::statistics::quantile;
 
 /// Frames with less true blur than this, in pixels, say nothing about a relative error or a direction.
 pub const MIN_TRUE_BLUR_PX: f64 = 5.0;

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{BlurEvaluation, Statistics, TrajectoryEvaluation};
+use super::{BlurEvaluation, TrajectoryEvaluation};
+use crate::statistics::Statistics;
 
 /// Figures of merit of a trajectory; the unit is part of the name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kd_tree::{KdTree, distance};
-use super::{Statistics, share_within};
+use crate::statistics::{Statistics, share_within};
 
 /// Points of the reference from which its spacing is taken.
 const SPACING_SAMPLES: usize = 10_000;

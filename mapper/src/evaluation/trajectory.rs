@@ -6,9 +6,8 @@ use thiserror::Error;
 
 use crate::trajectory_file::TimedPose;
 
-use super::{
-    Alignment, AlignmentError, DEFAULT_MAX_DT, Match, Similarity, Statistics, align, associate, share_within,
-};
+use super::{Alignment, AlignmentError, DEFAULT_MAX_DT, Match, Similarity, align, associate};
+use crate::statistics::{Statistics, share_within};
 
 /// A frame whose position error is at most this many metres counts as good: one bad frame can decide an RMSE, it
 /// cannot decide this share.

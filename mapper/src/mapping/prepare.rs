@@ -17,9 +17,10 @@ use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
 };
 use crate::dataset::Dataset;
-use crate::evaluation::{motion_of, quantile};
+use crate::evaluation::motion_of;
 use crate::exposure::{ExposurePath, RowTiming};
 use crate::run::{FrameRecord, FrameStatus, Run};
+use crate::statistics::quantile;
 use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.

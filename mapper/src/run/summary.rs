@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::{FrameRecord, FrameStatus, RunCamera};
-use crate::evaluation::{BlurFigures, TrajectoryFigures, quantile};
+use crate::evaluation::{BlurFigures, TrajectoryFigures};
+use crate::statistics::quantile;
 
 /// Version of the summary's layout.
 const FORMAT: u32 = 1;

@@ -1,6 +1,6 @@
 //! How alike two images are.
 
-use super::structural_similarity::{WINDOW, mean_ssim};
+use crate::losses::{WINDOW, mean_ssim};
 
 /// Why two images cannot be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

@@ -12,7 +12,6 @@ mod image;
 mod kd_tree;
 mod mesh_depth;
 mod pose_alignment;
-mod structural_similarity;
 mod surface;
 mod trajectory;
 
@@ -25,9 +24,6 @@ pub use image::{DepthDifference, ImageError, depth_difference, psnr, ssim};
 pub use kd_tree::KdTree;
 pub use mesh_depth::{MeshDepthError, MeshDepthFigures, evaluate_mesh_depth};
 pub use pose_alignment::{PoseAlignment, PoseAlignmentError, align_poses};
-#[cfg(test)]
-pub(crate) use structural_similarity::mean_ssim;
-pub(crate) use structural_similarity::{STABILISERS, WINDOW, window_weights};
 pub use surface::{MeanMedian, SurfaceComparisonError, SurfaceFigures, ThresholdFigures, evaluate_surface};
 pub use trajectory::{
     GOOD_FRAME_METRES, TrajectoryError, TrajectoryEvaluation, TrajectoryOptions, evaluate_trajectory,

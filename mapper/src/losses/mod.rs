@@ -3,3 +3,4 @@
 mod ssim;
 
 pub use ssim::Ssim;
+pub(crate) use ssim::{WINDOW, mean_ssim};

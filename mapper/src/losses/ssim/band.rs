@@ -9,8 +9,8 @@ use core::ops::Range;
 
 use fearless_simd::{Level, dispatch, f32x8, prelude::*};
 
+use super::definition::{STABILISERS, WINDOW};
 use super::window::{Chunk, LANES, RADIUS, Window, shifted};
-use crate::evaluation::{STABILISERS, WINDOW};
 
 /// Values are taken relative to the middle of their range: variances are differences of squares, which lose the
 /// fewer digits the smaller they are.

@@ -4,14 +4,15 @@
 //! its neighbours, so that bands share nothing; how the image is cut depends on its size only.
 
 mod band;
+mod definition;
 mod window;
 
 use mba_tracker::simd::Level;
 use rayon::prelude::*;
 
 use self::band::{Band, BandJob};
+pub(crate) use self::definition::{WINDOW, mean_ssim};
 use self::window::{RADIUS, Window};
-use crate::evaluation::WINDOW;
 
 /// Rows of a band. Ten more rows of windows are computed for it: fewer rows cost time, more leave threads idle.
 const BAND_ROWS: usize = 80;

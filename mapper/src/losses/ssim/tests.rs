@@ -1,7 +1,7 @@
 use mba_tracker::simd::{Level, level_name, levels_up_to};
 
 use super::Ssim;
-use crate::evaluation::mean_ssim;
+use super::definition::mean_ssim;
 
 type Planes<T> = [Vec<T>; 3];
 

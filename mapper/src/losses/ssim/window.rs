@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x8, prelude::*};
 
-use crate::evaluation::{WINDOW, window_weights};
+use super::definition::{WINDOW, window_weights};
 
 /// Pixels of a row of the window on either side of its middle.
 pub(super) const RADIUS: usize = WINDOW / 2;

@@ -43,6 +43,7 @@ pub mod raster;
 pub mod rendering;
 pub mod run;
 pub mod self_calibration;
+pub mod sensor;
 pub mod slam;
 pub mod statistics;
 pub mod surfaces;

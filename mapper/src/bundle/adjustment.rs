@@ -10,7 +10,6 @@ use super::engine::Exposure;
 use super::frame_state::FrameState;
 use super::loss::LossTerms;
 use super::map_model::{MapKind, SceneMap, SeedView, Workbench};
-use super::observation::{Observation, ObservationPyramid, Sensor};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
 use super::rectified::seen_at_once;
@@ -18,6 +17,7 @@ use super::schedule::{Schedule, StepPlan};
 use super::seeding::{self, DepthSource};
 use crate::deblurring::Reblurred;
 use crate::rendering::Scene;
+use crate::sensor::{Observation, ObservationPyramid, Sensor};
 
 /// How the bundle is adjusted.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

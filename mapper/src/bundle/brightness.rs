@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 
 use super::loss::CLIPPED;
-use super::observation::Observation;
+use crate::sensor::Observation;
 use crate::statistics::quantile;
 
 /// Every so many columns and rows a point is compared.

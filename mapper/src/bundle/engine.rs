@@ -3,14 +3,13 @@
 use mba_tracker::simd::Level;
 use nalgebra::SVector;
 
-use super::display::DisplayCurve;
 use super::loss::{DisplayPlanes, LossTerms, compare_depth};
-use super::observation::{Observation, Sensor};
 use super::schedule::StepPlan;
 use crate::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, PATH_PARAMETERS};
 use crate::gaussians::Gaussians;
 use crate::losses::Ssim;
 use crate::raster::{GaussianGradients, RasterImage};
+use crate::sensor::{DisplayCurve, Observation, Sensor};
 
 /// Renders exposures, compares them with what was captured, and takes gradients back. Memory is kept from exposure to
 /// exposure.

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::engine::{Exposure, ExposureLoss};
 use super::map_model::{MapModel, MapSize, SeedView, Workbench};
 use super::moving::WorldMoves;
-use super::observation::Observation;
 use super::schedule::StepPlan;
 use crate::rendering::Scene;
+use crate::sensor::Observation;
 use crate::triplane::{
     FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
     TriplaneField,

@@ -7,11 +7,11 @@ use super::engine::{Exposure, ExposureLoss};
 use super::ledger::Ledger;
 use super::map_model::{MapModel, MapSize, SeedView, Workbench};
 use super::moving::{WorldMoves, move_gaussians};
-use super::observation::Observation;
 use super::schedule::StepPlan;
 use super::{adam, density, seeding};
 use crate::gaussians::Gaussians;
 use crate::rendering::Scene;
+use crate::sensor::Observation;
 
 /// Longest growth of the map at one change of density, as a fraction of its size.
 const GROWTH: f64 = 0.15;

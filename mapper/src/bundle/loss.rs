@@ -4,10 +4,9 @@ use core::ops::Range;
 
 use rayon::prelude::*;
 
-use super::display::DisplayCurve;
-use super::observation::Observation;
 use crate::losses::Ssim;
 use crate::raster::RasterImage;
+use crate::sensor::{DisplayCurve, Observation};
 
 /// Weights of the terms.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,10 +10,10 @@ use super::engine::{Engine, Exposure, ExposureLoss};
 use super::field_map::FieldMap;
 use super::gaussian_map::GaussianMap;
 use super::moving::WorldMoves;
-use super::observation::{Observation, Sensor};
 use super::schedule::StepPlan;
 use super::seeding::DepthSource;
 use crate::rendering::{Scene, SceneRenderer};
+use crate::sensor::{Observation, Sensor};
 use crate::triplane::TriplaneEngine;
 
 /// What a map consists of.

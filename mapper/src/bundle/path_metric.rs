@@ -3,8 +3,8 @@
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use nalgebra::{Matrix6, RowVector6, Vector3, Vector6};
 
-use super::observation::Observation;
 use crate::exposure::ExposurePath;
+use crate::sensor::Observation;
 
 /// Every other pixel of every other row is looked at.
 const STRIDE: usize = 2;

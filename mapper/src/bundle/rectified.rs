@@ -6,8 +6,8 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::observation::Observation;
 use crate::exposure::{ExposurePath, RowTimes};
+use crate::sensor::Observation;
 
 /// Steps of the search for the row in which a point was seen, and for the depth at which a ray ends.
 const STEPS: usize = 4;

@@ -5,10 +5,10 @@ use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
 use super::map_model::SeedView;
-use super::observation::Observation;
 use super::smooth_depth::smooth_depth;
 use crate::gaussians::{Gaussian, Gaussians};
 use crate::infill;
+use crate::sensor::Observation;
 
 /// Side of the largest square that becomes one Gaussian, pixels.
 const LARGEST: usize = 16;

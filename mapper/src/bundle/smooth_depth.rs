@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::observation::Observation;
+use crate::sensor::Observation;
 
 /// Pixels on each side that take part.
 const RADIUS: usize = 4;

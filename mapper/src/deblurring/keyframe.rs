@@ -12,8 +12,8 @@ use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
 use mba_tracker::workspace::{ARENA_ALIGNMENT, Arena, WorkspaceError, slice_bytes};
 use mba_tracker::{Readout, SimdLevel, TrackerConfig};
 
-use super::ForwardResponse;
 use crate::dataset::{FrameError, RgbdFrame};
+use crate::sensor::ForwardResponse;
 use crate::trajectory_file::TimedExposure;
 
 /// Longest motion within an image, pixels, that is worth deblurring: below, rounding to bytes and noise hide it;

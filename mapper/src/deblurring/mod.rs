@@ -5,11 +5,9 @@
 //! final and nobody waits. What a map shows of a keyframe gets back the detail that only the captured picture knows.
 
 mod detail;
-mod encode;
 mod keyframe;
 mod run_keyframes;
 
 pub use detail::{LONGEST_BLUR, Reblurred};
-pub use encode::ForwardResponse;
 pub use keyframe::{DeblurError, DeblurMemory, Deblurred, KeyframeDeblurrer};
 pub use run_keyframes::write_deblurred_keyframes;

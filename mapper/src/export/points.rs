@@ -4,8 +4,8 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::photometric::InverseResponse;
 
 use super::frame_images::FrameImages;
-use crate::deblurring::ForwardResponse;
 use crate::gaussians::Gaussians;
+use crate::sensor::ForwardResponse;
 use crate::surfaces::Mesh;
 
 /// Logit of the opacity of one tenth. What is fainter shows no surface by itself.

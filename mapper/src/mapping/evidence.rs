@@ -3,10 +3,10 @@
 use mba_tracker::trajectory::ExposureTrajectory;
 
 use super::prepare::{observation_of, sensor};
-use crate::bundle::{Observation, Sensor};
 use crate::continuity::{FramePicture, Mismatch, Suspicion, compare_exposures};
 use crate::dataset::Dataset;
 use crate::exposure::RowTimes;
+use crate::sensor::{Observation, Sensor};
 
 /// Widest picture that is compared, pixels: misplaced frames are off by more than a pixel of it.
 const WIDEST: usize = 320;

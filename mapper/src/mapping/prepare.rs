@@ -9,10 +9,7 @@ use rayon::prelude::*;
 use super::choice::choose_keyframes;
 use super::evidence::FrameEvidence;
 use super::{MapError, MapSettings};
-use crate::bundle::{
-    BundleAdjustment, FrameState, Keyframe, NOTICEABLE, ObservationPyramid, PathPrior, Placed, Sensor,
-    log_brightness,
-};
+use crate::bundle::{BundleAdjustment, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
 use crate::continuity::{
     ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
 };
@@ -20,6 +17,7 @@ use crate::dataset::Dataset;
 use crate::evaluation::motion_of;
 use crate::exposure::{ExposurePath, RowTiming};
 use crate::run::{FrameRecord, FrameStatus, Run};
+use crate::sensor::{ObservationPyramid, Sensor};
 use crate::statistics::quantile;
 use crate::trajectory_file::TimedExposure;
 

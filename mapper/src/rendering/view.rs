@@ -10,12 +10,11 @@ use mba_tracker::photometric::InverseResponse;
 use rayon::prelude::*;
 
 use super::scene::{Scene, SceneRenderer};
-use crate::FileError;
-use crate::deblurring::ForwardResponse;
-use crate::infill;
 use crate::png::{encode_depth, encode_rgb};
 use crate::raster::RasterImage;
+use crate::sensor::ForwardResponse;
 use crate::whole_file::write_together;
+use crate::{FileError, infill};
 
 /// Above this alpha a pixel shows the map, below it mostly what is behind: nothing, and no depth.
 pub const SOLID_ALPHA: f32 = 0.5;

@@ -13,11 +13,12 @@ use super::loops::Loops;
 use super::messages::{Instruction, MapperLink, SharpView, Skipped, TrackedFrame};
 use super::saved::{Counts, Keeper, MapperParts, Replay, SavedKeyframe};
 use super::settings::{Arrival, SlamReference, SlamSettings};
-use crate::bundle::{BundleState, Keyframe, ObservationPyramid, PathPrior, Sensor};
+use crate::bundle::{BundleState, Keyframe, PathPrior};
 use crate::checkpoint::exact_poses::{numbers, pose};
 use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
+use crate::sensor::{ObservationPyramid, Sensor};
 use crate::trajectory_file::TimedExposure;
 
 /// Time after which the folder is brought up to date: a run that is killed loses no more.

@@ -10,12 +10,13 @@ use super::keyframe_choice::{NEW_AREA, Neighbour, is_worth_it, most_dispensable,
 use super::saved::{Growth, SavedKeyframe};
 use super::settings::SlamSettings;
 use crate::bundle::{
-    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, ObservationPyramid,
-    PathPrior, Placed, Schedule, Sensor, log_brightness,
+    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed,
+    Schedule, log_brightness,
 };
 use crate::dataset::RgbdFrame;
 use crate::evaluation::motion_of;
 use crate::exposure::ExposurePath;
+use crate::sensor::{ObservationPyramid, Sensor};
 use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.

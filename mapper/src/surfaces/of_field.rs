@@ -5,7 +5,7 @@ use mba_tracker::simd::Level;
 
 use super::field::LIMIT_MB;
 use super::{FieldBox, Mesh, Sight, SurfaceError, Trim, ViewSource, mesh_from_field};
-use crate::deblurring::ForwardResponse;
+use crate::sensor::ForwardResponse;
 use crate::triplane::TriplaneField;
 
 /// Edge of a block of voxels that is looked at or left out as a whole, at most this many truncations: then a surface in
@@ -146,8 +146,9 @@ mod tests {
     use mba_tracker::trajectory::ExposureTrajectory;
 
     use super::*;
-    use crate::bundle::{Exposure, Observation, Sensor};
+    use crate::bundle::Exposure;
     use crate::exposure::{ExposurePath, RowTimes, RowTiming};
+    use crate::sensor::{Observation, Sensor};
     use crate::surfaces::MapViews;
     use crate::triplane::{
         FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::view::{DepthView, SurfaceView};
 use super::{Mesh, components};
-use crate::deblurring::ForwardResponse;
+use crate::sensor::ForwardResponse;
 
 /// Weight of a colour where the view has no depth to be trusted: it counts where there is no other.
 const DOUBTFUL: f32 = 1e-6;

@@ -11,8 +11,9 @@ use super::gradients::{FieldGradients, Group};
 use super::prepared::Prepared;
 use super::ray_views::RayViews;
 use super::sampling::{Motion, SamplingSettings};
-use crate::bundle::{DisplayCurve, Exposure, ExposureLoss, LossTerms, Sensor};
+use crate::bundle::{Exposure, ExposureLoss, LossTerms};
 use crate::exposure::{ExposurePath, PATH_PARAMETERS};
+use crate::sensor::{DisplayCurve, Sensor};
 
 /// Weights of the terms of the loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -176,8 +177,8 @@ mod tests {
     use nalgebra::{UnitQuaternion, Vector3, Vector6};
 
     use super::*;
-    use crate::bundle::Observation;
     use crate::exposure::{RowTimes, RowTiming};
+    use crate::sensor::Observation;
     use crate::triplane::gradients::plane_values_mut;
     use crate::triplane::reference::lively_field;
 

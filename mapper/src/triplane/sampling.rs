@@ -4,7 +4,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use rand_pcg::Pcg32;
 
 use super::planes::unit;
-use crate::bundle::Observation;
+use crate::sensor::Observation;
 
 /// How many samples rays get, and where.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,8 +7,8 @@ use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::InverseResponse;
 use rayon::prelude::*;
 
+use super::forward_response::ForwardResponse;
 use crate::dataset::RgbdFrame;
-use crate::deblurring::ForwardResponse;
 use crate::exposure::{RowTimes, RowTiming};
 
 /// A captured frame at one resolution.

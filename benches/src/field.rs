@@ -1,7 +1,7 @@
 //! A tri-plane field that has begun to take the shape of the synthetic room, and a frame to compare it with.
 
-use mba_mapper::bundle::{Exposure, ExposureLoss};
 use mba_mapper::exposure::ExposurePath;
+use mba_mapper::losses::{Exposure, ExposureLoss};
 use mba_mapper::sensor::{Observation, ObservationPyramid};
 use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence};
 use mba_mapper::triplane::{

@@ -6,9 +6,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
-use super::engine::Exposure;
 use super::frame_state::FrameState;
-use super::loss::LossTerms;
 use super::map_model::{MapKind, SceneMap, SeedView, Workbench};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
@@ -16,6 +14,7 @@ use super::rectified::seen_at_once;
 use super::schedule::{Schedule, StepPlan};
 use super::seeding::{self, DepthSource};
 use crate::deblurring::Reblurred;
+use crate::losses::{Exposure, LossTerms};
 use crate::rendering::Scene;
 use crate::sensor::{Observation, ObservationPyramid, Sensor};
 

@@ -3,7 +3,7 @@
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 
-use super::loss::CLIPPED;
+use crate::losses::CLIPPED;
 use crate::sensor::Observation;
 use crate::statistics::quantile;
 

@@ -1,15 +1,13 @@
 //! The loss of one exposure and all its gradients.
 
 use mba_tracker::simd::Level;
-use nalgebra::SVector;
 
-use super::loss::{DisplayPlanes, LossTerms, compare_depth};
 use super::schedule::StepPlan;
-use crate::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, PATH_PARAMETERS};
+use crate::exposure::{ExposureRenderer, ExposureScratch};
 use crate::gaussians::Gaussians;
-use crate::losses::Ssim;
+use crate::losses::{DisplayPlanes, Exposure, ExposureLoss, Ssim, compare_depth};
 use crate::raster::{GaussianGradients, RasterImage};
-use crate::sensor::{DisplayCurve, Observation, Sensor};
+use crate::sensor::{DisplayCurve, Sensor};
 
 /// Renders exposures, compares them with what was captured, and takes gradients back. Memory is kept from exposure to
 /// exposure.
@@ -23,30 +21,6 @@ pub struct Engine {
     planes: DisplayPlanes,
     ssim: Ssim,
     gradients: GaussianGradients,
-}
-
-/// What a frame is compared with.
-#[derive(Clone, Copy, Debug)]
-pub struct Exposure<'a> {
-    /// What was captured, at the resolution of the plan.
-    pub seen: &'a Observation,
-    /// Path of the camera.
-    pub path: &'a ExposurePath,
-    /// Gain on the map's light.
-    pub gain: f64,
-    /// Number of virtual views of the exposure of a row.
-    pub views: usize,
-}
-
-/// Loss of an exposure, and gradients by what belongs to it alone.
-#[derive(Clone, Copy, Debug)]
-pub struct ExposureLoss {
-    /// The terms.
-    pub terms: LossTerms,
-    /// Gradient by the parameters of the path.
-    pub by_path: SVector<f64, PATH_PARAMETERS>,
-    /// Gradient by the logarithm of the gain.
-    pub by_log_gain: f64,
 }
 
 impl Engine {

@@ -3,10 +3,10 @@
 use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
-use super::engine::{Exposure, ExposureLoss};
 use super::map_model::{MapModel, MapSize, SeedView, Workbench};
 use super::moving::WorldMoves;
 use super::schedule::StepPlan;
+use crate::losses::{Exposure, ExposureLoss};
 use crate::rendering::Scene;
 use crate::sensor::Observation;
 use crate::triplane::{

@@ -6,12 +6,13 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
 use serde::{Deserialize, Serialize};
 
-use super::engine::{Engine, Exposure, ExposureLoss};
+use super::engine::Engine;
 use super::field_map::FieldMap;
 use super::gaussian_map::GaussianMap;
 use super::moving::WorldMoves;
 use super::schedule::StepPlan;
 use super::seeding::DepthSource;
+use crate::losses::{Exposure, ExposureLoss};
 use crate::rendering::{Scene, SceneRenderer};
 use crate::sensor::{Observation, Sensor};
 use crate::triplane::TriplaneEngine;

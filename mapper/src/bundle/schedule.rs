@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::adam::StepLengths;
-use super::loss::LossWeights;
 use super::map_model::MapKind;
+use crate::losses::LossWeights;
 
 /// How one step is made.
 #[derive(Clone, Copy, Debug, PartialEq)]

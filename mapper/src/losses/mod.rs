@@ -1,6 +1,11 @@
-//! Losses on rendered images, with their gradients by the pixels.
+//! Losses of rendered exposures against what was captured, with their gradients by the pixels.
 
+mod exposure;
+mod image_loss;
 mod ssim;
 
+pub use exposure::{Exposure, ExposureLoss};
+pub(crate) use image_loss::{CLIPPED, DisplayPlanes, NOISE, compare_depth, smooth_absolute};
+pub use image_loss::{LossTerms, LossWeights};
 pub use ssim::Ssim;
 pub(crate) use ssim::{WINDOW, mean_ssim};

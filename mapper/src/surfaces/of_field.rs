@@ -146,8 +146,8 @@ mod tests {
     use mba_tracker::trajectory::ExposureTrajectory;
 
     use super::*;
-    use crate::bundle::Exposure;
     use crate::exposure::{ExposurePath, RowTimes, RowTiming};
+    use crate::losses::Exposure;
     use crate::sensor::{Observation, Sensor};
     use crate::surfaces::MapViews;
     use crate::triplane::{

@@ -13,7 +13,7 @@ use super::opacity::{Opacity, weigh, weigh_backward};
 use super::prepared::{FieldSamples, Prepared};
 use super::ray_views::RayViews;
 use super::sampling::{MidDepth, Motion, NEAREST, SamplingSettings, stratified};
-use crate::bundle::{CLIPPED, NOISE, smooth_absolute};
+use crate::losses::{CLIPPED, NOISE, smooth_absolute};
 use crate::sensor::{DisplayCurve, Observation};
 
 /// Pixels per chunk: what belongs to one stays in the cache of a core.

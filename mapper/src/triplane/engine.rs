@@ -11,8 +11,8 @@ use super::gradients::{FieldGradients, Group};
 use super::prepared::Prepared;
 use super::ray_views::RayViews;
 use super::sampling::{Motion, SamplingSettings};
-use crate::bundle::{Exposure, ExposureLoss, LossTerms};
 use crate::exposure::{ExposurePath, PATH_PARAMETERS};
+use crate::losses::{Exposure, ExposureLoss, LossTerms};
 use crate::sensor::{DisplayCurve, Sensor};
 
 /// Weights of the terms of the loss.

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::losses::Ssim;
+use super::Ssim;
 use crate::raster::RasterImage;
 use crate::sensor::{DisplayCurve, Observation};
 
@@ -56,7 +56,7 @@ impl LossTerms {
 
 /// Display values of a rendered image and the gradient by them.
 #[derive(Debug, Default)]
-pub(super) struct DisplayPlanes {
+pub(crate) struct DisplayPlanes {
     /// Rendered display values.
     rendered: [Vec<f32>; 3],
     /// Captured display values; the rendered ones where they do not count.
@@ -107,7 +107,7 @@ impl Row<'_> {
 impl DisplayPlanes {
     /// Takes a rendered image to display values, with `gain` and the lens's fall-off on its light, and starts the gradient with the colour
     /// term. Returns that term and the mean squared difference. Image and observation have the same size.
-    pub(super) fn compare(
+    pub(crate) fn compare(
         &mut self,
         curve: &DisplayCurve,
         gain: f32,
@@ -160,14 +160,14 @@ impl DisplayPlanes {
     }
 
     /// Adds the term of structural similarity, `weight` times one minus it, to the gradient and returns it.
-    pub(super) fn add_similarity(&mut self, ssim: &mut Ssim, size: [usize; 2], weight: f32) -> f64 {
+    pub(crate) fn add_similarity(&mut self, ssim: &mut Ssim, size: [usize; 2], weight: f32) -> f64 {
         let [captured, rendered] = [&self.captured, &self.rendered].map(|p| p.each_ref().map(Vec::as_slice));
         let gradient = self.gradient.each_mut().map(Vec::as_mut_slice);
         f64::from(weight) * (1.0 - ssim.add_gradient(size, captured, rendered, -weight, gradient))
     }
 
     /// Takes the gradient from display values to linear light, and returns the gradient by the logarithm of the gain.
-    pub(super) fn gradient_by_light(&self, image: &RasterImage, out: &mut RasterImage) -> f64 {
+    pub(crate) fn gradient_by_light(&self, image: &RasterImage, out: &mut RasterImage) -> f64 {
         let mut by_gain = 0.0;
         for channel in 0..3 {
             let planes = (
@@ -192,7 +192,7 @@ impl DisplayPlanes {
 }
 
 /// Depth and alpha terms; their gradients replace those by depth and alpha in `out`.
-pub(super) fn compare_depth(
+pub(crate) fn compare_depth(
     image: &RasterImage,
     seen: &Observation,
     weights: &LossWeights,

@@ -1,9 +1,8 @@
 //! A bundle that is being adjusted: blurred frames of the synthetic room and a map seeded from them.
 
-use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, FrameState, Keyframe, MapKind, PathPrior, StepReport,
-};
+use mba_mapper::bundle::{BundleAdjustment, BundleSettings, FrameState, Keyframe, PathPrior, StepReport};
 use mba_mapper::exposure::{ExposurePath, RowTiming};
+use mba_mapper::map::MapKind;
 use mba_mapper::sensor::{ObservationPyramid, Sensor};
 use mba_mapper::synth::{SynthConfig, SynthError, SynthFrame, SynthSequence};
 use mba_tracker::image::PixelRectangle;

@@ -33,6 +33,7 @@ pub mod image_folders;
 pub mod imu;
 pub mod infill;
 pub mod losses;
+pub mod map;
 pub mod mapping;
 pub mod output;
 pub mod places;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use mba_mapper::bundle::MapKind;
+use mba_mapper::map::MapKind;
 use mba_mapper::mapping::MapSettings;
 
 use super::BlurMode;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
+use mba_mapper::map::Scene;
 use mba_mapper::output::{OutputFile, Permission};
-use mba_mapper::rendering::Scene;
 use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::surfaces::{
     DepthView, FusionSettings, MapViews, MeshFormat, SurfaceError, Trim, ViewSource, YAxis, passes,

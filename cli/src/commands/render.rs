@@ -4,9 +4,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use mba_mapper::evaluation::PoseAlignment;
+use mba_mapper::map::{MAP_FILE, StoredMap};
 use mba_mapper::output::{Permission, ViewFolder};
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
-use mba_mapper::run::{MAP_FILE, Run, RunCamera, Spread, StoredMap};
+use mba_mapper::run::{Run, RunCamera, Spread};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use serde::Serialize;
 

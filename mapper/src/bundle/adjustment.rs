@@ -7,7 +7,7 @@ use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
 use super::frame_state::FrameState;
-use super::map_model::{MapKind, SceneMap, SeedView, Workbench};
+use super::map_model::{SceneMap, SeedView, Workbench};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
 use super::rectified::seen_at_once;
@@ -15,7 +15,7 @@ use super::schedule::{Schedule, StepPlan};
 use super::seeding::{self, DepthSource};
 use crate::deblurring::Reblurred;
 use crate::losses::{Exposure, LossTerms};
-use crate::rendering::Scene;
+use crate::map::{MapKind, Scene};
 use crate::sensor::{Observation, ObservationPyramid, Sensor};
 
 /// How the bundle is adjusted.

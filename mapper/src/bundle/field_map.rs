@@ -3,11 +3,11 @@
 use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
-use super::map_model::{MapModel, MapSize, SeedView, Workbench};
+use super::map_model::{MapModel, SeedView, Workbench};
 use super::moving::WorldMoves;
 use super::schedule::StepPlan;
 use crate::losses::{Exposure, ExposureLoss};
-use crate::rendering::Scene;
+use crate::map::{MapSize, Scene};
 use crate::sensor::Observation;
 use crate::triplane::{
     FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,

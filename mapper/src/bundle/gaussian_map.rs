@@ -4,13 +4,13 @@ use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
 use super::ledger::Ledger;
-use super::map_model::{MapModel, MapSize, SeedView, Workbench};
+use super::map_model::{MapModel, SeedView, Workbench};
 use super::moving::{WorldMoves, move_gaussians};
 use super::schedule::StepPlan;
 use super::{adam, density, seeding};
 use crate::gaussians::Gaussians;
 use crate::losses::{Exposure, ExposureLoss};
-use crate::rendering::Scene;
+use crate::map::{MapSize, Scene};
 use crate::sensor::Observation;
 
 /// Longest growth of the map at one change of density, as a fraction of its size.

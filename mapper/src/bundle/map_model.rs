@@ -1,7 +1,5 @@
 //! What the adjustment asks of a map, whatever it consists of.
 
-use core::fmt;
-
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
 use serde::{Deserialize, Serialize};
@@ -13,45 +11,9 @@ use super::moving::WorldMoves;
 use super::schedule::StepPlan;
 use super::seeding::DepthSource;
 use crate::losses::{Exposure, ExposureLoss};
-use crate::rendering::{Scene, SceneRenderer};
+use crate::map::{MapKind, MapSize, Scene, SceneRenderer};
 use crate::sensor::{Observation, Sensor};
 use crate::triplane::TriplaneEngine;
-
-/// What a map consists of.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum MapKind {
-    /// 3D Gaussians.
-    #[default]
-    Gaussians,
-    /// A tri-plane field of signed distance and colour.
-    Field,
-}
-
-/// How large a map is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MapSize {
-    /// Number of Gaussians.
-    Gaussians(usize),
-    /// Bytes of a field's planes and decoders in memory.
-    FieldBytes(usize),
-}
-
-impl MapSize {
-    /// Number of Gaussians; 0 for a map of another kind.
-    #[must_use]
-    pub fn gaussians(&self) -> usize {
-        if let Self::Gaussians(count) = self { *count } else { 0 }
-    }
-}
-
-impl fmt::Display for MapSize {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Gaussians(count) => write!(f, "{count} Gaussians"),
-            Self::FieldBytes(bytes) => write!(f, "{:.1} MB of planes", *bytes as f64 / 1e6),
-        }
-    }
-}
 
 /// Tables and memory that maps work with. Only the gradients of the last exposure stay, for the step that follows.
 #[derive(Debug)]

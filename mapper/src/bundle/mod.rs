@@ -28,7 +28,7 @@ pub use engine::Engine;
 pub use field_map::FieldMap;
 pub use frame_state::FrameState;
 pub use gaussian_map::GaussianMap;
-pub use map_model::{MapKind, MapSize, SceneMap};
+pub use map_model::SceneMap;
 pub use moving::WorldMoves;
 pub use path_metric::PathMetric;
 pub use path_step::PathPrior;

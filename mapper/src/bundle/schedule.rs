@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::adam::StepLengths;
-use super::map_model::MapKind;
 use crate::losses::LossWeights;
+use crate::map::MapKind;
 
 /// How one step is made.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,9 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::between::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, merit, output};
-use crate::bundle::{BundleAdjustment, BundleState, MapSize};
+use crate::bundle::{BundleAdjustment, BundleState};
 use crate::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use crate::dataset::Dataset;
+use crate::map::MapSize;
 use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
 

@@ -7,8 +7,9 @@ use super::between::Fit;
 use super::driver::{Adjustment, BUDGET_RESERVE, Checkpoint, Conclusion, Running};
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
-use crate::bundle::{BundleAdjustment, DepthSource, MapKind, Schedule};
+use crate::bundle::{BundleAdjustment, DepthSource, Schedule};
 use crate::dataset::Dataset;
+use crate::map::MapKind;
 use crate::run::{FrameRecord, RunWriter, Summary};
 use crate::trajectory_file::TimedExposure;
 

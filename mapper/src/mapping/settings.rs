@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use serde::Serialize;
 
-use crate::bundle::{BundleSettings, MapKind};
+use crate::bundle::BundleSettings;
+use crate::map::MapKind;
 
 /// Settings of [`map_dataset`](super::map_dataset).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -9,7 +9,7 @@ use mba_tracker::photometric::InverseResponse;
 
 use rayon::prelude::*;
 
-use super::scene::{Scene, SceneRenderer};
+use crate::map::{Scene, SceneRenderer};
 use crate::png::{encode_depth, encode_rgb};
 use crate::raster::RasterImage;
 use crate::sensor::ForwardResponse;

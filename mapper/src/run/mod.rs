@@ -16,7 +16,6 @@ mod camera;
 mod error;
 mod frame_record;
 mod keyframe_images;
-mod map;
 mod merit;
 mod reader;
 mod rows;
@@ -27,7 +26,6 @@ pub use camera::{RunCamera, RunResponse};
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus, Reason};
 pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
-pub use map::{MapFileError, StoredMap};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
 pub(crate) use reader::is_run;
@@ -41,10 +39,6 @@ pub const TRAJECTORY_FILE: &str = "trajectory.txt";
 pub const EXPOSURES_FILE: &str = "exposures.txt";
 /// Name of the table of frames.
 pub const FRAMES_FILE: &str = "frames.csv";
-/// Name of a map of Gaussians.
-pub const MAP_FILE: &str = "map.ply";
-/// Name of a map that is a tri-plane field.
-pub const FIELD_FILE: &str = "map.mbaf";
 /// Name of the summary.
 pub const SUMMARY_FILE: &str = "summary.json";
 /// Name of what a run that was stopped goes on from.

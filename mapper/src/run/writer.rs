@@ -9,12 +9,12 @@ use mba_tracker::geometry::RigidTransform;
 use super::keyframe_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{
-    CHECKPOINT_FILE, EXPOSURES_FILE, FIELD_FILE, FRAMES_FILE, MAP_FILE, SUMMARY_FILE, TRAJECTORY_FILE,
+    CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, FrameStatus, RunError, RunSettings,
+    SUMMARY_FILE, Summary, TRAJECTORY_FILE, frame_record,
 };
-use super::{FrameRecord, FrameStatus, RunError, RunSettings, StoredMap, Summary, frame_record};
 use crate::gaussians::write_ply;
+use crate::map::{FIELD_FILE, MAP_FILE, Scene, StoredMap};
 use crate::output::{OutputFolder, Permission};
-use crate::rendering::Scene;
 use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use crate::triplane::write_field;
 use crate::whole_file::write_together;

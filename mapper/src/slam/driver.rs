@@ -13,9 +13,10 @@ use super::saved::{
 };
 use super::settings::{Arrival, SlamSettings};
 use super::{SlamError, front_end};
-use crate::bundle::{BundleAdjustment, BundleState, MapSize};
+use crate::bundle::{BundleAdjustment, BundleState};
 use crate::checkpoint::load;
 use crate::dataset::Dataset;
+use crate::map::MapSize;
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
 use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};

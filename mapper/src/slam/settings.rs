@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use mba_tracker::ReferenceMode;
 
-use crate::bundle::MapKind;
+use crate::map::MapKind;
 use crate::mapping::MapSettings;
 use crate::tracking::TrackingOptions;
 

@@ -4,8 +4,8 @@ use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 
 use super::{DepthView, ViewSource};
+use crate::map::{Scene, SceneRenderer};
 use crate::raster::RasterImage;
-use crate::rendering::{Scene, SceneRenderer};
 
 /// Depth is used where the map hides at least this share of what is behind it.
 const OPAQUE: f32 = 0.5;

@@ -34,7 +34,7 @@ pub use sight::{Sight, Trim};
 pub use tsdf::{FusionSettings, fuse_views};
 pub use view::{DepthView, ViewSource};
 
-use crate::rendering::Scene;
+use crate::map::Scene;
 
 /// The coloured surface of a map that views of it show, with voxels of `settings.voxel`: a field's is where its distance
 /// is zero, that of Gaussians is fused from the views. Without parts of less than `trim.least_area`.

@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
+use super::scene::Scene;
 use super::{FIELD_FILE, MAP_FILE};
 use crate::gaussians::{Gaussians, PlyError, read_ply};
-use crate::rendering::Scene;
 use crate::triplane::{FieldFileError, TriplaneField, read_field};
 
 /// A map that was read.

@@ -35,6 +35,7 @@ pub mod infill;
 pub mod losses;
 pub mod map;
 pub mod mapping;
+pub mod mesh;
 pub mod output;
 pub mod places;
 mod ply;

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use indicatif::ProgressBar;
 use mba_mapper::map::Scene;
+use mba_mapper::mesh::{MeshFormat, YAxis};
 use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::surfaces::{
-    DepthView, FusionSettings, MapViews, MeshFormat, SurfaceError, Trim, ViewSource, YAxis, passes,
-    surface_of_map,
+    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map,
 };
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;

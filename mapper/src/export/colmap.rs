@@ -8,8 +8,8 @@
 use std::fmt::Write as _;
 
 use super::{PIXEL_CENTRE, PosedFrame, image_name};
+use crate::mesh::Mesh;
 use crate::run::RunCamera;
-use crate::surfaces::Mesh;
 
 /// Name of the file of cameras.
 pub const CAMERAS_FILE: &str = "sparse/0/cameras.txt";

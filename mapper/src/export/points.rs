@@ -5,8 +5,8 @@ use mba_tracker::photometric::InverseResponse;
 
 use super::frame_images::FrameImages;
 use crate::gaussians::Gaussians;
+use crate::mesh::Mesh;
 use crate::sensor::ForwardResponse;
-use crate::surfaces::Mesh;
 
 /// Logit of the opacity of one tenth. What is fainter shows no surface by itself.
 const FAINTEST_LOGIT: f32 = -2.197_224_6;

@@ -10,10 +10,10 @@ use super::{
 };
 use crate::dataset::{Dataset, InvalidValue};
 use crate::gaussians::Gaussians;
+use crate::mesh::{Mesh, format_mesh};
 use crate::output::ExportFolder;
 use crate::png::{encode_depth, encode_rgb};
 use crate::run::{Run, RunCamera};
-use crate::surfaces::{Mesh, format_mesh};
 
 /// Frames whose images are read and encoded at the same time.
 const FRAMES_AT_A_TIME: usize = 16;

@@ -9,9 +9,9 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::gaussians::{Gaussian, Gaussians};
+use crate::mesh::read_mesh;
 use crate::output::{ExportFolder, Permission};
 use crate::run::{FrameRecord, FrameStatus, Run, RunCamera, RunResponse, RunSettings, RunWriter};
-use crate::surfaces::read_mesh;
 use crate::trajectory_file::TimedExposure;
 
 /// Columns and rows.

@@ -2,8 +2,9 @@
 
 use rayon::prelude::*;
 
+use super::SurfaceError;
 use super::marching::{Assembly, Lattice, Piece, SampleBox};
-use super::{Mesh, SurfaceError};
+use crate::mesh::Mesh;
 
 /// Layers of cells that are in memory at once, and cells across a box of one task.
 const SLAB: usize = 16;

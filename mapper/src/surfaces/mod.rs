@@ -6,28 +6,19 @@
 //! other way round, [`depth_image`] is what a camera sees of a mesh.
 
 mod components;
-mod depth_image;
 mod error;
 mod field;
 mod map_views;
 mod marching;
-mod mesh;
-mod mesh_file;
 mod of_field;
 mod sampling;
 mod sight;
 mod tsdf;
 mod view;
 
-pub use crate::ply::PlyError;
-pub use depth_image::depth_image;
 pub use error::SurfaceError;
 pub use field::{FieldBox, mesh_from_field};
 pub use map_views::MapViews;
-pub use mesh::Mesh;
-pub use mesh_file::{
-    MeshFormat, MeshTooLarge, YAxis, format_mesh, is_own_mesh, parse_mesh, read_mesh, write_mesh,
-};
 pub use of_field::surface_of_field;
 pub use sampling::sample_surface;
 pub use sight::{Sight, Trim};
@@ -35,6 +26,7 @@ pub use tsdf::{FusionSettings, fuse_views};
 pub use view::{DepthView, ViewSource};
 
 use crate::map::Scene;
+use crate::mesh::Mesh;
 
 /// The coloured surface of a map that views of it show, with voxels of `settings.voxel`: a field's is where its distance
 /// is zero, that of Gaussians is fused from the views. Without parts of less than `trim.least_area`.

@@ -4,7 +4,8 @@ use mba_tracker::photometric::InverseResponse;
 use mba_tracker::simd::Level;
 
 use super::field::LIMIT_MB;
-use super::{FieldBox, Mesh, Sight, SurfaceError, Trim, ViewSource, mesh_from_field};
+use super::{FieldBox, Sight, SurfaceError, Trim, ViewSource, mesh_from_field};
+use crate::mesh::Mesh;
 use crate::sensor::ForwardResponse;
 use crate::triplane::TriplaneField;
 

@@ -4,8 +4,9 @@ use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::components;
 use super::view::{DepthView, SurfaceView};
-use super::{Mesh, components};
+use crate::mesh::Mesh;
 use crate::sensor::ForwardResponse;
 
 /// Weight of a colour where the view has no depth to be trusted: it counts where there is no other.

@@ -9,9 +9,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use rayon::prelude::*;
 
 use super::{BlurFigure, SynthError, SynthSequence, description, inertial, truth};
+use crate::mesh::{Mesh, write_mesh};
 use crate::output::OutputFolder;
 use crate::png::{encode_depth, encode_rgb};
-use crate::surfaces::{Mesh, write_mesh};
 use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory};
 use crate::whole_file::{write_text, write_together};
 

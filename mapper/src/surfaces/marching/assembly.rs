@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::piece::{Crossing, Piece};
-use crate::surfaces::Mesh;
+use crate::mesh::Mesh;
 
 /// Where the points of a regular grid are.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,7 +13,8 @@ use blocks::{Blocks, EDGE, Place, add_places};
 use rayon::prelude::*;
 
 use super::marching::{Assembly, Lattice, Piece, SampleBox};
-use super::{Mesh, SurfaceError, ViewSource};
+use super::{SurfaceError, ViewSource};
+use crate::mesh::Mesh;
 
 /// How views are fused.
 #[derive(Clone, Copy, Debug, PartialEq)]

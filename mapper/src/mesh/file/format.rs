@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use super::glb::{YAxis, format_glb, is_own_glb};
+use super::glb::{MeshTooLarge, YAxis, format_glb, is_own_glb};
 use super::obj::{format_obj, is_own_obj};
 use super::{format_mesh, is_own_mesh};
-use crate::surfaces::Mesh;
+use crate::mesh::Mesh;
 
 /// A format of meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,14 +16,6 @@ pub enum MeshFormat {
     Glb,
     /// Wavefront OBJ with colours of vertices.
     Obj,
-}
-
-/// A mesh does not fit into its format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the mesh takes {bytes} bytes, more than the 4 GiB of a GLB file")]
-pub struct MeshTooLarge {
-    /// Bytes of the file.
-    pub bytes: usize,
 }
 
 impl MeshFormat {

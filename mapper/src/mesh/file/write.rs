@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::FileError;
-use crate::surfaces::Mesh;
+use crate::mesh::Mesh;
 use crate::whole_file::write_together;
 
 /// What every mesh of this program starts with.

@@ -6,8 +6,8 @@ mod obj;
 mod read;
 mod write;
 
-pub use format::{MeshFormat, MeshTooLarge};
-pub use glb::YAxis;
+pub use format::MeshFormat;
+pub use glb::{MeshTooLarge, YAxis};
 pub use read::{parse_mesh, read_mesh};
 pub use write::{format_mesh, is_own_mesh, write_mesh};
 
@@ -16,7 +16,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::surfaces::{Mesh, PlyError};
+    use crate::mesh::{Mesh, PlyError};
 
     fn square() -> Mesh {
         Mesh {

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
+use crate::mesh::Mesh;
 use crate::ply::{Element, Header, PlyError, Records};
-use crate::surfaces::Mesh;
 use crate::whole_file::read;
 
 /// Names of the list of a face's corners; writers disagree.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use nalgebra::{Vector2, Vector3};
 
-use super::Mesh;
+use super::triangles::Mesh;
 
 /// What is nearer than this along the optical axis, metres, is cut off: points behind the camera have no image.
 const NEAREST: f64 = 0.05;

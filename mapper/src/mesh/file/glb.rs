@@ -7,8 +7,15 @@
 
 use serde_json::{Value, json};
 
-use super::MeshTooLarge;
-use crate::surfaces::Mesh;
+use crate::mesh::Mesh;
+
+/// A mesh does not fit into its format.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the mesh takes {bytes} bytes, more than the 4 GiB of a GLB file")]
+pub struct MeshTooLarge {
+    /// Bytes of the file.
+    pub bytes: usize,
+}
 
 /// What the text starts with.
 const START: &str = r#"{"asset":{"generator":"mba","version":"2.0"},"#;

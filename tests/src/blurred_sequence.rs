@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use mba_mapper::dataset::{self, Dataset};
-use mba_mapper::evaluation::{blur_length, motion_of};
+use mba_mapper::exposure::{blur_length, motion_of};
 use mba_mapper::map::StoredMap;
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::output::{OutputFolder, Permission};

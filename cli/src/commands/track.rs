@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use mba_mapper::dataset::Dataset;
-use mba_mapper::deblurring::write_deblurred_keyframes;
-use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary, write_deblurred_keyframes};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 

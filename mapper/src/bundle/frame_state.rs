@@ -6,8 +6,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::path_step::PathMoments;
-use crate::evaluation::blur_length;
-use crate::exposure::ExposurePath;
+use crate::exposure::{ExposurePath, blur_length};
 
 /// Path and brightness of one frame, and how their optimisation goes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

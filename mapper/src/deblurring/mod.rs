@@ -6,8 +6,6 @@
 
 mod detail;
 mod keyframe;
-mod run_keyframes;
 
 pub use detail::{LONGEST_BLUR, Reblurred};
 pub use keyframe::{DeblurError, DeblurMemory, Deblurred, KeyframeDeblurrer};
-pub use run_keyframes::write_deblurred_keyframes;

@@ -3,16 +3,13 @@
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use crate::trajectory_file::TimedExposure;
-
 use super::associate;
+use crate::exposure::{blur_length, motion_of};
 use crate::statistics::quantile;
+use crate::trajectory_file::TimedExposure;
 
 /// Frames with less true blur than this, in pixels, say nothing about a relative error or a direction.
 pub const MIN_TRUE_BLUR_PX: f64 = 5.0;
-
-/// Points per image axis at which a blur length is sampled.
-const GRID: usize = 5;
 
 /// True and estimated blur of one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,13 +33,6 @@ pub struct BlurEvaluation {
     pub median_relative_error: Option<f64>,
     /// Share (0 to 1) with the right direction of time; `None` without blurred frames.
     pub direction_share: Option<f64>,
-}
-
-/// The linear motion between a recorded exposure's ends. Only the ends count: blur length and direction do not depend
-/// on the path between them.
-#[must_use]
-pub fn motion_of(exposure: &TimedExposure) -> ExposureTrajectory {
-    ExposureTrajectory { start: exposure.start, end: exposure.end }
 }
 
 /// Compares the exposures of `reference` and `estimate` (both ascending in time) that are at most `max_dt` seconds
@@ -88,27 +78,6 @@ fn compare_motions(
     }
 }
 
-/// Mean distance in pixels between where the cameras at opening and at closing see the same point, over a regular
-/// grid of pixels of the mid-exposure camera whose points lie at depth `depth` (metres).
-#[must_use]
-pub fn blur_length(exposure: &ExposureTrajectory, camera: &PinholeCamera, depth: f64) -> f64 {
-    let mid = exposure.mid();
-    let start_from_mid = exposure.start.inverse().compose(&mid);
-    let end_from_mid = exposure.end.inverse().compose(&mid);
-    let mut sum = 0.0;
-    for row in 0..GRID {
-        for column in 0..GRID {
-            let u = (column as f64 + 0.5) / GRID as f64 * camera.width as f64 - 0.5;
-            let v = (row as f64 + 0.5) / GRID as f64 * camera.height as f64 - 0.5;
-            let x_mid = camera.ray(u, v) * depth;
-            let at_start = camera.project(&start_from_mid.transform_point(&x_mid));
-            let at_end = camera.project(&end_from_mid.transform_point(&x_mid));
-            sum += (at_end - at_start).norm();
-        }
-    }
-    sum / (GRID * GRID) as f64
-}
-
 /// Scalar product of two motions in square metres; a rotation counts as the path it moves a point at `depth`.
 fn motion_product(a: &ExposureTrajectory, b: &ExposureTrajectory, depth: f64) -> f64 {
     let translation = |e: &ExposureTrajectory| {
@@ -136,12 +105,6 @@ mod tests {
 
     fn somewhere() -> RigidTransform {
         RigidTransform::new(so3::exp(&Vector3::new(0.4, -2.0, 1.0)), Vector3::new(3.0, 2.0, 1.0))
-    }
-
-    #[test]
-    fn sideways_motion_blurs_by_focal_length_times_path_over_depth() {
-        let e = exposure(&somewhere(), [0.04, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert!((blur_length(&e, &CAMERA, 2.0) - 10.0).abs() < 1e-9);
     }
 
     #[test]

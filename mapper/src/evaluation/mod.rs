@@ -17,7 +17,7 @@ mod trajectory;
 
 pub use alignment::{Alignment, AlignmentError, Similarity, align};
 pub use association::{DEFAULT_MAX_DT, Match, associate};
-pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, blur_length, evaluate_blur, motion_of};
+pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, evaluate_blur};
 pub use figures::{BlurFigures, TrajectoryFigures};
 pub use icp::refine_by_icp;
 pub use image::{DepthDifference, ImageError, depth_difference, psnr, ssim};

@@ -5,12 +5,14 @@
 //! exposure of its own, and depth may be that of another time. The gradient of a loss goes back through every view to
 //! the Gaussians and to the poses at shutter opening and closing.
 
+mod blur;
 mod path;
 mod renderer;
 mod rows;
 mod scratch;
 mod timing;
 
+pub use blur::{blur_length, motion_of};
 pub use path::{ExposurePath, PATH_PARAMETERS};
 pub use renderer::ExposureRenderer;
 pub use scratch::ExposureScratch;

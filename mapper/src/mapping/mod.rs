@@ -14,6 +14,7 @@ mod finish;
 mod merit;
 mod output;
 mod prepare;
+mod run_continuity;
 mod settings;
 
 pub(crate) use driver::{Checkpoint, Running, dataset_fingerprint};
@@ -21,4 +22,5 @@ pub use driver::{MapProgress, map_dataset};
 pub use error::MapError;
 pub(crate) use finish::Finish;
 pub(crate) use prepare::sensor;
+pub use run_continuity::{RepairedRun, repair_run, run_frames};
 pub use settings::MapSettings;

@@ -8,14 +8,12 @@ use rayon::prelude::*;
 
 use super::choice::choose_keyframes;
 use super::evidence::FrameEvidence;
+use super::run_continuity::{RepairedRun, repair_run, run_frames};
 use super::{MapError, MapSettings};
 use crate::bundle::{BundleAdjustment, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
-use crate::continuity::{
-    ContinuitySettings, FrameVerdict, RepairedRun, Suspicion, predict_motions, repair_run, run_frames,
-};
+use crate::continuity::{ContinuitySettings, FrameVerdict, Suspicion, predict_motions};
 use crate::dataset::Dataset;
-use crate::evaluation::motion_of;
-use crate::exposure::{ExposurePath, RowTiming};
+use crate::exposure::{ExposurePath, RowTiming, motion_of};
 use crate::run::{FrameRecord, FrameStatus, Run};
 use crate::sensor::{ObservationPyramid, Sensor};
 use crate::statistics::quantile;

@@ -13,6 +13,7 @@
 //! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
 
 mod camera;
+mod deblurred_keyframes;
 mod error;
 mod frame_record;
 mod keyframe_images;
@@ -23,6 +24,7 @@ mod summary;
 mod writer;
 
 pub use camera::{RunCamera, RunResponse};
+pub use deblurred_keyframes::write_deblurred_keyframes;
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus, Reason};
 pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};

@@ -14,8 +14,7 @@ use crate::bundle::{
     Schedule, log_brightness,
 };
 use crate::dataset::RgbdFrame;
-use crate::evaluation::motion_of;
-use crate::exposure::ExposurePath;
+use crate::exposure::{ExposurePath, motion_of};
 use crate::sensor::{ObservationPyramid, Sensor};
 use crate::trajectory_file::TimedExposure;
 

@@ -4,7 +4,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::trajectory::ExposureTrajectory;
 
 use crate::bundle::BundleAdjustment;
-use crate::evaluation::blur_length;
+use crate::exposure::blur_length;
 
 /// Movement of the picture from the nearest keyframe that makes a new view, as a fraction of the width.
 const NEW_VIEW: f64 = 0.01;

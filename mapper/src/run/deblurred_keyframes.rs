@@ -3,9 +3,9 @@
 use mba_tracker::{SimdLevel, TrackerConfig};
 use rayon::prelude::*;
 
-use super::{DeblurError, DeblurMemory, KeyframeDeblurrer};
+use super::{RunError, RunWriter};
 use crate::dataset::Dataset;
-use crate::run::{RunError, RunWriter};
+use crate::deblurring::{DeblurError, DeblurMemory, KeyframeDeblurrer};
 use crate::trajectory_file::TimedExposure;
 
 /// Why a keyframe has no image.

@@ -2,10 +2,10 @@
 
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use super::{
+use crate::continuity::{
     Continuity, ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, PoseNoise, repair_by_evidence,
 };
-use crate::evaluation::motion_of;
+use crate::exposure::motion_of;
 use crate::run::{FrameRecord, FrameStatus};
 use crate::statistics::quantile;
 use crate::trajectory_file::TimedExposure;
@@ -29,7 +29,7 @@ pub struct RepairedRun {
 /// frames with the status ok are trusted.
 ///
 /// # Errors
-/// As [`repair`](super::repair), and [`ContinuityError::Lengths`].
+/// As [`repair`](crate::continuity::repair), and [`ContinuityError::Lengths`].
 pub fn repair_run(
     exposures: &[TimedExposure],
     records: &[FrameRecord],
@@ -47,7 +47,7 @@ pub fn repair_run(
     Ok(RepairedRun { exposures, continuity })
 }
 
-/// The frames of a run as [`repair`](super::repair) and [`predict_motions`](super::predict_motions) take them.
+/// The frames of a run as [`repair`](crate::continuity::repair) and [`predict_motions`](crate::continuity::predict_motions) take them.
 ///
 /// # Errors
 /// [`ContinuityError::Lengths`].

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-use super::fit::Measured;
+use super::measured::Measured;
 use super::scales::{Sample, typical_derivatives};
 use super::spline::Part;
 

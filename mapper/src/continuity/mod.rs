@@ -20,6 +20,7 @@ mod error;
 mod evidence;
 mod fit;
 mod frame;
+mod measured;
 mod picture;
 mod prediction;
 mod problem;

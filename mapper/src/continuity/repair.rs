@@ -5,8 +5,9 @@ use std::ops::Range;
 use mba_tracker::trajectory::ExposureTrajectory;
 use rayon::prelude::*;
 
-use super::fit::{FEWEST_FRAMES, Fit, Held, Measured, fit};
+use super::fit::{FEWEST_FRAMES, Fit, fit};
 use super::frame::validate;
+use super::measured::{Held, Measured};
 use super::{ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, Suspicion};
 use crate::statistics::quantile;
 

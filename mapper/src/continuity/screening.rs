@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::ContinuitySettings;
 use super::direction::reversed_exposures;
-use super::fit::{Judgement, Measured};
+use super::measured::{Judgement, Measured};
 use super::scales::{MEDIAN_NORM_3, Sample, derivative, typical_derivatives};
 use super::spline::Part;
 use crate::statistics::quantile;

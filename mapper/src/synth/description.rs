@@ -6,9 +6,11 @@ use nalgebra::Vector3;
 
 use super::{
     CameraMotion, DepthSensor, ResponseCurve, SensorModel, Summary, SynthConfig, SynthSequence, inertial,
-    truth,
 };
 use crate::dataset::{Vignetting, response_text};
+
+/// Folder in a data set for what its calibration does not say.
+pub(super) const TRUTH_FOLDER: &str = "truth";
 
 /// `calibration.toml` with all there is to know of the camera.
 pub(super) fn calibration(sequence: &SynthSequence) -> String {
@@ -183,7 +185,7 @@ fn sensor_notes(sequence: &SynthSequence) -> String {
         notes.push(format!(
             "NOT on record, to be estimated: exposure times, readout time, response, fall-off. {}/ has them, for judging \
              only.",
-            truth::FOLDER
+            TRUTH_FOLDER
         ));
     }
     if !(events.black.is_empty() && events.saturated.is_empty()) {

@@ -21,9 +21,18 @@ const BESIDE_THE_PATH: [([f64; 3], [f64; 3]); 4] = [
     ([0.02, 0.02, -0.02], [0.0, 0.02, -0.03]),
 ];
 
+impl SynthSequence {
+    /// Poses near the camera's path, between frames and a little beside it, in order of time; with
+    /// [`Self::render_view`] they test whether a map shows more than its own images.
+    #[must_use]
+    pub fn heldout_poses(&self) -> Vec<TimedPose> {
+        poses(self)
+    }
+}
+
 /// Poses half way between two frames in time, a little beside the camera's path; their timestamps lie between those
 /// of the frames.
-pub(super) fn poses(sequence: &SynthSequence) -> Vec<TimedPose> {
+fn poses(sequence: &SynthSequence) -> Vec<TimedPose> {
     let views = sequence.len().div_ceil(FRAMES_PER_VIEW).min(MAX_VIEWS);
     let half_interval = 0.5 / sequence.config().frame_rate;
     let pose = |(view, beside): (usize, &([f64; 3], [f64; 3]))| {

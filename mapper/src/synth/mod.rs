@@ -27,6 +27,7 @@ mod description;
 mod develop;
 mod error;
 mod events;
+mod heading;
 mod heldout;
 mod inertial;
 mod motion;
@@ -39,6 +40,7 @@ mod sensor_tests;
 mod sequence;
 #[cfg(test)]
 mod sequence_tests;
+mod summary;
 mod surface;
 mod timing;
 mod truth;
@@ -50,4 +52,5 @@ pub use config::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName
 pub use error::SynthError;
 pub use events::{Events, FrameRanges};
 pub use sequence::{SynthFrame, SynthSequence};
-pub use writer::{Summary, write_dataset};
+pub use summary::Summary;
+pub use writer::write_dataset;

@@ -1,10 +1,11 @@
 //! The camera's path: a slow sweep or a round with hand shake on top, exact at any time.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use mba_tracker::geometry::{RigidTransform, so3};
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 
+use super::heading::upright_camera;
 use super::random::{Purpose, RowRandom};
 use super::round::Round;
 
@@ -31,17 +32,8 @@ impl Sweep {
         let wave = Vector3::new((turn + 0.9).sin(), (1.7 * turn).sin(), (2.0 * turn + 0.4).cos());
         let yaw = self.yaw + self.yaw_sway * turn.sin();
         let pitch = self.pitch + self.pitch_sway * (1.3 * turn + 1.0).sin();
-        RigidTransform::new(looking(yaw, pitch), self.centre + self.sway.component_mul(&wave))
+        RigidTransform::new(upright_camera(yaw, pitch), self.centre + self.sway.component_mul(&wave))
     }
-}
-
-/// The rotation of an upright camera; angles as in [`Sweep`].
-pub(super) fn looking(yaw: f64, pitch: f64) -> UnitQuaternion<f64> {
-    let heading = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), yaw);
-    let elevation = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), -pitch);
-    // Camera axes are right, down, forward; half a turn about z takes them from x, y (up), z.
-    let upright = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI);
-    heading * elevation * upright
 }
 
 /// Hand tremor and sway: frequencies in Hz, whose ratios are irrational in practice so that the motion never

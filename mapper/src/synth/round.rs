@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::Vector3;
 
-use super::motion::looking;
+use super::heading::upright_camera;
 
 /// A walk on an ellipse, or out along its longer side and back. Metres, radians.
 #[derive(Clone, Copy)]
@@ -32,7 +32,10 @@ impl Round {
         let angle = self.start + way;
         let place = Vector3::new(angle.sin(), (2.0 * way).sin(), angle.cos());
         let pitch = self.pitch + self.pitch_sway * way.sin();
-        RigidTransform::new(looking(self.turn * angle, pitch), self.centre + self.radii.component_mul(&place))
+        RigidTransform::new(
+            upright_camera(self.turn * angle, pitch),
+            self.centre + self.radii.component_mul(&place),
+        )
     }
 }
 

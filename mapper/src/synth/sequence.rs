@@ -11,9 +11,8 @@ use super::motion::{CameraPath, Steady};
 use super::render::{self, DepthSample, Size, SubFrame, TURNED_GRID};
 use super::scene::Scene;
 use super::view::View;
-use super::{CameraMotion, SynthConfig, SynthError, auto_exposure, heldout, surface, timing};
+use super::{CameraMotion, SynthConfig, SynthError, auto_exposure, timing};
 use crate::dataset::RgbdFrame;
-use crate::trajectory_file::TimedPose;
 
 /// Fewest sub-frames of a blurred image.
 const MIN_SUB_FRAMES: usize = 16;
@@ -223,20 +222,6 @@ impl SynthSequence {
     #[must_use]
     pub fn render_view(&self, world_from_camera: &RigidTransform) -> Vec<u8> {
         self.render_clean(world_from_camera, self.config.exposure_seconds)
-    }
-
-    /// Poses near the camera's path, between frames and a little beside it, in order of time; with
-    /// [`Self::render_view`] they test whether a map shows more than its own images.
-    #[must_use]
-    pub fn heldout_poses(&self) -> Vec<TimedPose> {
-        heldout::poses(self)
-    }
-
-    /// Points of the true surface that frames see at mid exposure: world, metres, about a centimetre apart where pixels
-    /// are that dense; meshes can be judged by them.
-    #[must_use]
-    pub fn surface_points(&self) -> Vec<[f32; 3]> {
-        surface::points(self)
     }
 
     /// The points of the world that the pixels of frame `index` see at mid exposure, without noise; none if it is covered

@@ -10,9 +10,18 @@ const CELL: f32 = 0.01;
 /// Most frames whose view is looked at, evenly chosen.
 const MAX_VIEWS: usize = 100;
 
+impl SynthSequence {
+    /// Points of the true surface that frames see at mid exposure: world, metres, about a centimetre apart where pixels
+    /// are that dense; meshes can be judged by them.
+    #[must_use]
+    pub fn surface_points(&self) -> Vec<[f32; 3]> {
+        points(self)
+    }
+}
+
 /// Points of the world (metres) that frames see at mid exposure, about a centimetre apart where pixels are that dense;
 /// in order of the frames.
-pub(super) fn points(sequence: &SynthSequence) -> Vec<[f32; 3]> {
+fn points(sequence: &SynthSequence) -> Vec<[f32; 3]> {
     let views = sequence.len().min(MAX_VIEWS);
     let mut taken = HashSet::new();
     let mut points = Vec::new();

@@ -2,17 +2,15 @@
 
 use std::path::Path;
 
+use super::description::TRUTH_FOLDER;
 use super::{ResponseCurve, SynthError, SynthSequence, description};
 use crate::dataset::Vignetting;
 use crate::whole_file::write_text;
 
-/// Folder in the data set.
-pub(super) const FOLDER: &str = "truth";
-
 /// Writes `calibration.toml`, as it would be on record, exposure times, the response as a curve and a README.
 pub(super) fn write(sequence: &SynthSequence, folder: &Path) -> Result<(), SynthError> {
     let config = sequence.config();
-    let folder = folder.join(FOLDER);
+    let folder = folder.join(TRUTH_FOLDER);
     let Vignetting { a2, a4 } = config.sensor.vignetting;
     let readme = format!(
         "readout {:?} s, of depth {:?} s; vignetting 1 + {a2:?} r^2 + {a4:?} r^4 (r = 1 in the corner); exposures.csv; response.csv: \

@@ -8,25 +8,14 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use super::description::TRUTH_FOLDER;
+use super::summary::Summary;
 use super::{BlurFigure, SynthError, SynthSequence, description, inertial, truth};
 use crate::mesh::{Mesh, write_mesh};
 use crate::output::OutputFolder;
 use crate::png::{encode_depth, encode_rgb};
 use crate::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory};
 use crate::whole_file::{write_text, write_together};
-
-/// What was written.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
-    /// Number of frames.
-    pub frames: usize,
-    /// Mean over the frames of their mean blur, pixels.
-    pub mean_blur_px: f64,
-    /// Largest 95th percentile of the blur of a frame, pixels.
-    pub largest_p95_px: f64,
-    /// Most sub-frames that were averaged into one frame.
-    pub most_sub_frames: usize,
-}
 
 /// Figures of one written frame.
 struct Written {
@@ -93,7 +82,7 @@ fn write_all(
     folder: &Path,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<Summary, SynthError> {
-    let truth = (!sequence.config().sensor.is_on_record).then_some(truth::FOLDER);
+    let truth = (!sequence.config().sensor.is_on_record).then_some(TRUTH_FOLDER);
     for name in IMAGE_FOLDERS.into_iter().chain(truth) {
         let path = folder.join(name);
         fs::create_dir(&path).map_err(|reason| SynthError::unwritable(path, reason))?;
@@ -171,7 +160,7 @@ fn clear(folder: &Path) {
         remove(images.join(POSES_FILE));
         let _ = fs::remove_dir(images);
     }
-    let truth = folder.join(truth::FOLDER);
+    let truth = folder.join(TRUTH_FOLDER);
     for place in [&truth, folder] {
         FILES.iter().for_each(|name| remove(place.join(name)));
     }

@@ -3,11 +3,13 @@
 use glam::{Vec2, Vec3};
 use nalgebra::Vector3;
 
-use super::super::CameraMotion;
 use super::lighting::{Lamp, Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
-use super::{Enclosure, Round, Scene, Sweep, Thing, shadows};
+use super::world::{Enclosure, Scene, Thing, shadows};
+use crate::synth::CameraMotion;
+use crate::synth::motion::Sweep;
+use crate::synth::round::Round;
 
 pub(super) fn build(motion: CameraMotion) -> Scene {
     let mut things = Vec::new();

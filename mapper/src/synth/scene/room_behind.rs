@@ -2,9 +2,9 @@
 
 use glam::Vec2;
 
-use super::Thing;
 use super::material::Material;
 use super::pattern::colour;
+use super::world::Thing;
 
 /// Along the near wall and the near ends of the walls beside it.
 pub(super) fn furniture() -> Vec<Thing> {

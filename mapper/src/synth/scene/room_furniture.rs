@@ -2,9 +2,9 @@
 
 use glam::{IVec2, Vec2};
 
-use super::Thing;
 use super::material::Material;
 use super::pattern::{colour, random};
+use super::world::Thing;
 
 /// A table top with four legs; `size` is width, height, depth.
 fn table(x: f32, z: f32, size: [f32; 3], look: Material) -> Vec<Thing> {

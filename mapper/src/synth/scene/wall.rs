@@ -8,7 +8,9 @@ use nalgebra::Vector3;
 use super::lighting::{Lamps, Lighting};
 use super::material::Material;
 use super::pattern::colour;
-use super::{Enclosure, Round, Scene, Sweep};
+use super::world::{Enclosure, Scene};
+use crate::synth::motion::Sweep;
+use crate::synth::round::Round;
 
 pub(super) fn build() -> Scene {
     let bricks = Material::Bricks { brick: colour(0xb5634a), mortar: colour(0xc9c1b2) };

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::FusionSettings;
+use super::settings::FusionSettings;
 use crate::surfaces::SurfaceError;
 use crate::surfaces::view::{DepthView, SurfaceView};
 

@@ -3,8 +3,8 @@
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-use super::FusionSettings;
 use super::blocks::{Block, Blocks, EDGE, Place};
+use super::settings::FusionSettings;
 use crate::surfaces::view::{DepthView, SurfaceView};
 
 /// Voxels nearer to the camera than this, metres, are left alone.

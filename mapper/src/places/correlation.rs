@@ -1,5 +1,8 @@
 //! Normalised correlation of two thumbnails under shifts.
 
+use mba_tracker::geometry::{RigidTransform, so3};
+use nalgebra::Vector3;
+
 use super::PlaceDescriptor;
 
 /// Furthest shift along each axis, thumbnail pixels: a seventh of the width.
@@ -8,9 +11,25 @@ const REACH: isize = 3;
 /// Shifts along one axis.
 const SHIFTS: usize = (2 * REACH + 1) as usize;
 
+impl PlaceDescriptor {
+    /// How much a stored view looks like this one, -1 to 1, and the rotation `stored_from_query` that fits best. Views of
+    /// cameras with another aspect ratio have nothing in common: 0.
+    #[must_use]
+    pub fn compare(&self, stored: &Self) -> (f32, RigidTransform) {
+        if self.height != stored.height {
+            return (0.0, RigidTransform::identity());
+        }
+        let (similarity, [right, down]) = best_shift(self, stored);
+        // A turn to the right moves the image to the left: about y by the shift, about x against it.
+        let turn = Vector3::new(-(down / self.focal[1]).atan(), (right / self.focal[0]).atan(), 0.0);
+        let stored_from_query = RigidTransform::new(so3::exp(&turn), Vector3::zeros());
+        (similarity, stored_from_query)
+    }
+}
+
 /// Largest correlation over all shifts, and the shift in thumbnail pixels (right, down) that takes `query` to it in
 /// `stored`, refined between pixels.
-pub(super) fn best_shift(query: &PlaceDescriptor, stored: &PlaceDescriptor) -> (f32, [f64; 2]) {
+fn best_shift(query: &PlaceDescriptor, stored: &PlaceDescriptor) -> (f32, [f64; 2]) {
     let mut correlations = [[0.0; SHIFTS]; SHIFTS];
     let (mut best, mut place) = (f32::NEG_INFINITY, [0; 2]);
     for (row, line) in correlations.iter_mut().enumerate() {

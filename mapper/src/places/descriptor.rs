@@ -1,9 +1,6 @@
 //! A view as a small blurry image.
 
-use mba_tracker::geometry::{PinholeCamera, RigidTransform, so3};
-use nalgebra::Vector3;
-
-use super::correlation::best_shift;
+use mba_tracker::geometry::PinholeCamera;
 
 /// Columns of a thumbnail; one is about 3 degrees wide.
 const COLUMNS: usize = 20;
@@ -47,7 +44,7 @@ pub struct PlaceDescriptor {
     /// Of zero mean and unit norm, or all zero for an image without structure.
     pub(super) values: Vec<f32>,
     /// Focal lengths along x and y, thumbnail pixels.
-    focal: [f64; 2],
+    pub(super) focal: [f64; 2],
 }
 
 impl PlaceDescriptor {
@@ -77,20 +74,6 @@ impl PlaceDescriptor {
         let scale = |size: usize, image_size: usize| size as f64 / image_size as f64;
         let focal = [camera.fx * scale(COLUMNS, image_width), camera.fy * scale(height, image_height)];
         Ok(Self { width: COLUMNS, height, values, focal })
-    }
-
-    /// How much a stored view looks like this one, -1 to 1, and the rotation `stored_from_query` that fits best. Views of
-    /// cameras with another aspect ratio have nothing in common: 0.
-    #[must_use]
-    pub fn compare(&self, stored: &Self) -> (f32, RigidTransform) {
-        if self.height != stored.height {
-            return (0.0, RigidTransform::identity());
-        }
-        let (similarity, [right, down]) = best_shift(self, stored);
-        // A turn to the right moves the image to the left: about y by the shift, about x against it.
-        let turn = Vector3::new(-(down / self.focal[1]).atan(), (right / self.focal[0]).atan(), 0.0);
-        let stored_from_query = RigidTransform::new(so3::exp(&turn), Vector3::zeros());
-        (similarity, stored_from_query)
     }
 }
 

@@ -7,10 +7,10 @@ use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::RigidTransform;
 
 use super::SlamError;
-use super::driver::SlamProgress;
 use super::growing_map::{GrowingMap, LEVELS};
 use super::loops::Loops;
 use super::messages::{Instruction, MapperLink, SharpView, Skipped, TrackedFrame};
+use super::progress::SlamProgress;
 use super::saved::{Counts, Keeper, MapperParts, Replay, SavedKeyframe};
 use super::settings::{Arrival, SlamReference, SlamSettings};
 use crate::bundle::{BundleState, Keyframe, PathPrior};

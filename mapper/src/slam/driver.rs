@@ -8,6 +8,7 @@ use mba_tracker::{SimdLevel, TrackerConfig};
 
 use super::back_end::{BackEnd, keyframe_images, keyframes};
 use super::messages::link;
+use super::progress::SlamProgress;
 use super::saved::{
     Counts, Keeper, MapperParts, RefiningParts, Replay, Saved, SavedKeyframe, Saving, identity,
 };
@@ -16,34 +17,10 @@ use super::{SlamError, front_end};
 use crate::bundle::{BundleAdjustment, BundleState};
 use crate::checkpoint::load;
 use crate::dataset::Dataset;
-use crate::map::MapSize;
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
 use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
 use crate::tracking::{TrackingError, tracker_config};
-
-/// Where a run stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum SlamProgress {
-    /// Frames come in.
-    Frames {
-        /// Frames so far.
-        frames: usize,
-        /// Keyframes of the map.
-        keyframes: usize,
-        /// How large the map is.
-        map: MapSize,
-        /// Loops that were closed.
-        loops: usize,
-    },
-    /// The last frame was seen, all of the map is refined.
-    Refinement {
-        /// Share that is done, 0 to 1.
-        position: f64,
-        /// PSNR of blurred renderings against captured frames in dB.
-        psnr: f64,
-    },
-}
 
 /// Tracks and maps `dataset` at the same time into the RUN folder `out`. With `resume`, a run in lock step goes on from the
 /// checkpoint in `out` if there is one. `describe` becomes the settings of the run; `observe` is called after every frame

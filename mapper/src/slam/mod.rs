@@ -20,11 +20,13 @@ mod keyframe_choice;
 mod loops;
 mod messages;
 mod pace;
+mod progress;
 mod saved;
 mod second_look;
 mod settings;
 mod sharp_view;
 
-pub use driver::{SlamProgress, run_slam};
+pub use driver::run_slam;
 pub use error::SlamError;
+pub use progress::SlamProgress;
 pub use settings::{Arrival, SlamReference, SlamSettings};

@@ -3,7 +3,8 @@
 use mba_tracker::geometry::RigidTransform;
 
 use super::MapSettings;
-use super::prepare::{Frames, observation, sensor};
+use super::observations::{observation, sensor};
+use super::prepare::Frames;
 use crate::bundle::{BundleAdjustment, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
 use crate::dataset::Dataset;
 use crate::run::FrameStatus;

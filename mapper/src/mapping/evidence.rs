@@ -2,7 +2,7 @@
 
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use super::prepare::{observation_of, sensor};
+use super::observations::{observation_of, sensor};
 use crate::continuity::{FramePicture, Mismatch, Suspicion, compare_exposures};
 use crate::dataset::Dataset;
 use crate::exposure::RowTimes;

@@ -1,26 +1,22 @@
 //! From a run to a bundle that can be adjusted.
 
-use std::sync::Arc;
-
 use mba_tracker::SimdLevel;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
 use super::choice::choose_keyframes;
 use super::evidence::FrameEvidence;
+use super::observations::{observation, sensor};
 use super::run_continuity::{RepairedRun, repair_run, run_frames};
 use super::{MapError, MapSettings};
 use crate::bundle::{BundleAdjustment, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
 use crate::continuity::{ContinuitySettings, FrameVerdict, Suspicion, predict_motions};
 use crate::dataset::Dataset;
-use crate::exposure::{ExposurePath, RowTiming, motion_of};
+use crate::exposure::{ExposurePath, motion_of};
 use crate::run::{FrameRecord, FrameStatus, Run};
-use crate::sensor::{ObservationPyramid, Sensor};
+use crate::sensor::Sensor;
 use crate::statistics::quantile;
 use crate::trajectory_file::TimedExposure;
-
-/// Resolutions of an observation: full and half.
-const LEVELS: usize = 2;
 
 /// Largest difference between the times of a frame in the run and in the data set, seconds.
 const SAME_TIME: f64 = 1e-4;
@@ -41,23 +37,6 @@ pub(super) struct Frames {
     pub(super) warnings: Vec<String>,
     /// Whether neighbours say anything about a frame.
     continuity: bool,
-}
-
-/// How frames of the data set become observations.
-pub(crate) fn sensor(dataset: &Dataset) -> Sensor {
-    let calibration = dataset.calibration();
-    Sensor {
-        camera: calibration.camera,
-        inverse_response: calibration.response.inverse(),
-        depth_scale: calibration.depth_scale,
-        region: dataset.region_with_source(),
-        rows: RowTiming {
-            // Rows of unknown times count as exposed together.
-            readout_seconds: calibration.readout.readout_seconds().unwrap_or(0.0),
-            depth_readout_seconds: calibration.depth_readout_seconds,
-        },
-        falloff: dataset.light_falloff().map(Arc::from),
-    }
 }
 
 impl Frames {
@@ -208,26 +187,6 @@ fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState])
         let median = quantile(&log_gains, 0.5).unwrap_or(0.0);
         states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain - median);
     }
-}
-
-/// Reads a frame.
-pub(super) fn observation(
-    dataset: &Dataset,
-    sensor: &Sensor,
-    index: usize,
-) -> Result<ObservationPyramid, String> {
-    observation_of(dataset, sensor, index, LEVELS)
-}
-
-/// Reads a frame at that many resolutions.
-pub(super) fn observation_of(
-    dataset: &Dataset,
-    sensor: &Sensor,
-    index: usize,
-    levels: usize,
-) -> Result<ObservationPyramid, String> {
-    let frame = dataset.frame(index).map_err(|error| error.to_string())?;
-    ObservationPyramid::new(sensor, &frame, levels).ok_or_else(|| "its size is not the camera's".to_owned())
 }
 
 /// The path over `stretch` times the exposure time, `seconds`. A straight exposure says nothing about a bow, which

@@ -5,7 +5,6 @@ use nalgebra::{Vector3, Vector6};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-use super::engine::FieldWeights;
 use super::gradients::Group;
 use super::layers::Layers;
 use super::march::{Ray, first_surfaces};
@@ -13,6 +12,7 @@ use super::opacity::{Opacity, weigh, weigh_backward};
 use super::prepared::{FieldSamples, Prepared};
 use super::ray_views::RayViews;
 use super::sampling::{MidDepth, Motion, NEAREST, SamplingSettings, stratified};
+use super::weights::FieldWeights;
 use crate::losses::{CLIPPED, NOISE, smooth_absolute};
 use crate::sensor::{DisplayCurve, Observation};
 

@@ -36,9 +36,10 @@ mod render;
 mod sampling;
 mod scatter;
 mod settings;
+mod weights;
 
 pub use adam::{FieldStep, TriplaneAdam};
-pub use engine::{FieldExposure, FieldWeights, TriplaneEngine};
+pub use engine::{FieldExposure, TriplaneEngine};
 pub use field::TriplaneField;
 pub use gradients::FieldGradients;
 pub use map_file::{FieldFileError, read_field, write_field};
@@ -46,3 +47,4 @@ pub use region::Region;
 pub use render::FieldRenderer;
 pub use sampling::SamplingSettings;
 pub use settings::{CHANNELS, COARSE_CELL, FEATURES, FieldSettings, HIDDEN, MOST_REFINEMENT};
+pub use weights::FieldWeights;

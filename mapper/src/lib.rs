@@ -28,6 +28,7 @@ mod error;
 pub mod evaluation;
 pub mod export;
 pub mod exposure;
+mod file_kind;
 pub mod gaussians;
 pub mod image_folders;
 pub mod imu;

@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use crate::FileError;
-use crate::output::kind_of;
+use crate::file_kind::kind_of;
 
 /// Bytes of the largest text file that is read: exposures of a million frames.
 const LARGEST_TEXT: u64 = 256 << 20;

@@ -25,6 +25,7 @@ mod frame;
 mod knowledge;
 mod known_cameras;
 mod numbered_images;
+mod options;
 mod pose_matrix;
 mod replica;
 mod response_table;
@@ -52,23 +53,11 @@ pub use exposure_list::{read_exposure_times, write_exposure_times};
 pub use frame::RgbdFrame;
 pub use frame::read_image;
 pub use knowledge::{CalibrationSources, CameraFact, Knowledge};
+pub use options::OpenOptions;
 pub(crate) use response_table::to_text as response_text;
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
 pub use vignetting::Vignetting;
-
-/// How a data set is opened.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OpenOptions {
-    /// Largest time difference between a colour image and its depth image, seconds; not negative. Default 0.02.
-    pub association_tolerance: f64,
-}
-
-impl Default for OpenOptions {
-    fn default() -> Self {
-        Self { association_tolerance: 0.02 }
-    }
-}
 
 /// Opens the data set in `folder` with default options: recognises the layout, reads lists, calibration and
 /// ground truth, but no images.

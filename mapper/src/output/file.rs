@@ -4,9 +4,10 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
-use super::place::{kind_of, resolve};
+use super::place::resolve;
 use super::{OutputError, Permission};
 use crate::FileError;
+use crate::file_kind::kind_of;
 use crate::whole_file::write_together;
 
 /// Bytes of an existing file that it is recognised by.

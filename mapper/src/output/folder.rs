@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::lock::{self, Lock};
-use super::place::{Place, kind_of, resolve};
+use super::place::{Place, resolve};
 use super::{OutputError, is_lock};
+use crate::file_kind::kind_of;
 use crate::run::{DEBLURRED_FOLDER, DEPTH_FOLDER, is_run};
 
 /// What the user allows, and what the command reads.

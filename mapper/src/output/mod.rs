@@ -25,7 +25,6 @@ pub use export::ExportFolder;
 pub use file::OutputFile;
 pub use folder::{OutputFolder, Permission};
 pub(crate) use lock::is_lock;
-pub(crate) use place::kind_of;
 pub use views::ViewFolder;
 
 pub use crate::whole_file::write_text;

@@ -45,6 +45,7 @@ pub mod pose_graph;
 pub mod raster;
 pub mod rendering;
 pub mod run;
+mod run_layout;
 pub mod self_calibration;
 pub mod sensor;
 pub mod slam;

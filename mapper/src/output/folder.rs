@@ -8,7 +8,7 @@ use super::lock::{self, Lock};
 use super::place::{Place, resolve};
 use super::{OutputError, is_lock};
 use crate::file_kind::kind_of;
-use crate::run::{DEBLURRED_FOLDER, DEPTH_FOLDER, is_run};
+use crate::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER, is_run};
 
 /// What the user allows, and what the command reads.
 #[derive(Clone, Copy, Debug, Default)]

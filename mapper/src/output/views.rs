@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::folder::Layout;
 use super::listed::{FileList, ListedFolder, remove};
 use super::{OutputError, Permission};
-use crate::run::DEPTH_FOLDER;
+use crate::run_layout::DEPTH_FOLDER;
 
 const LIST: FileList = FileList {
     file: ".mba-views",

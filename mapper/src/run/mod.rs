@@ -14,6 +14,7 @@
 
 mod camera;
 mod deblurred_keyframes;
+mod earlier_images;
 mod error;
 mod frame_record;
 mod keyframe_images;
@@ -27,21 +28,13 @@ pub use camera::{RunCamera, RunResponse};
 pub use deblurred_keyframes::write_deblurred_keyframes;
 pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus, Reason};
-pub use keyframe_images::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
-pub(crate) use reader::is_run;
 pub(crate) use rows::RunRows;
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 
-/// Name of the trajectory at mid exposure.
-pub const TRAJECTORY_FILE: &str = "trajectory.txt";
-/// Name of the poses at opening, middle and closing of the shutter.
-pub const EXPOSURES_FILE: &str = "exposures.txt";
-/// Name of the table of frames.
-pub const FRAMES_FILE: &str = "frames.csv";
-/// Name of the summary.
-pub const SUMMARY_FILE: &str = "summary.json";
-/// Name of what a run that was stopped goes on from.
-pub const CHECKPOINT_FILE: &str = "checkpoint";
+pub use crate::run_layout::{
+    CHECKPOINT_FILE, DEBLURRED_FOLDER, DEPTH_FOLDER, EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE,
+    TRAJECTORY_FILE, deblurred_path,
+};

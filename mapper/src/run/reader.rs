@@ -45,16 +45,6 @@ impl Run {
     }
 }
 
-/// Whether a command wrote `folder`: its summary has the form of one, whatever the version.
-pub(crate) fn is_run(folder: &Path) -> bool {
-    let text = read_text(&folder.join(SUMMARY_FILE)).unwrap_or_default();
-    let summary: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-    summary["format"].is_u64()
-        && summary["complete"].is_boolean()
-        && summary["program"].is_string()
-        && summary["frames"].is_object()
-}
-
 #[cfg(test)]
 mod tests {
     use std::fs;

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use mba_tracker::geometry::RigidTransform;
 
-use super::keyframe_images::remove_keyframe_images;
+use super::earlier_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{
     CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, FrameStatus, RunError, RunSettings,

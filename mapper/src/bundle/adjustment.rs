@@ -7,12 +7,14 @@ use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
 use super::frame_state::FrameState;
-use super::map_model::{SceneMap, SeedView, Workbench};
+use super::map_model::FitContext;
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
 use super::rectified::seen_at_once;
+use super::scene_map::SceneMap;
 use super::schedule::{Schedule, StepPlan};
-use super::seeding::{self, DepthSource};
+use super::seed_view::{DepthSource, SeedView};
+use super::seeding;
 use crate::deblurring::Reblurred;
 use crate::losses::{Exposure, LossTerms};
 use crate::map::{MapKind, Scene};
@@ -81,7 +83,7 @@ pub struct BundleAdjustment {
     pub(super) keyframes: Vec<Keyframe>,
     settings: BundleSettings,
     schedule: Schedule,
-    bench: Workbench,
+    context: FitContext,
     /// Order of the visits of the current round, and which round that is.
     round: (usize, Vec<usize>),
 }
@@ -124,7 +126,7 @@ impl BundleAdjustment {
             position: 0.0,
         };
         let round = (usize::MAX, Vec::new());
-        Self { state, keyframes, settings, schedule, bench: Workbench::new(level, sensor), round }
+        Self { state, keyframes, settings, schedule, context: FitContext::new(level, sensor), round }
     }
 
     /// The keyframes.
@@ -136,7 +138,7 @@ impl BundleAdjustment {
     /// The sensor.
     #[must_use]
     pub fn sensor(&self) -> &Sensor {
-        &self.bench.sensor
+        &self.context.sensor
     }
 
     /// The schedule.
@@ -201,12 +203,12 @@ impl BundleAdjustment {
         let Keyframe { index, observation, .. } = &self.keyframes[k];
         let seen = seen_at_once(observation.level(0), path);
         let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
-        self.state.map.model_mut().seed(&mut self.bench, &view, self.settings.max_gaussians);
+        self.state.map.model_mut().seed(&mut self.context, &view, self.settings.max_gaussians);
     }
 
     /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
     pub fn open_share(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
-        let Workbench { renderer, sensor, .. } = &mut self.bench;
+        let FitContext { renderer, sensor, .. } = &mut self.context;
         renderer.render(self.state.map.scene(), sensor.camera.at_level(level), world_from_camera);
         let alpha = &renderer.image.alpha;
         let open = alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
@@ -224,7 +226,7 @@ impl BundleAdjustment {
         let views = self.settings.view_count(keyframe, frame, &plan).of_row;
         let gain = frame.log_gain.exp() as f32;
         let image =
-            self.bench.engine.render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
+            self.context.engine.render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
         let as_captured = |plane: &Vec<f32>| match &seen.falloff {
             Some(falloff) => {
                 plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()
@@ -264,10 +266,10 @@ impl BundleAdjustment {
         let views = count.of_row;
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
         let draw = self.state.steps as u64;
-        let loss = self.state.map.model().evaluate(&mut self.bench, exposure, plan, draw);
+        let loss = self.state.map.model().evaluate(&mut self.context, exposure, plan, draw);
 
         let BundleState { map, frames, steps, .. } = &mut self.state;
-        map.model_mut().step(&mut self.bench, plan);
+        map.model_mut().step(&mut self.context, plan);
         let frame = &mut frames[k];
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
@@ -299,7 +301,7 @@ impl BundleAdjustment {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
             let views = self.settings.view_count(unmapped, frame, &plan).of_row;
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-            let loss = self.state.map.model().evaluate(&mut self.bench, exposure, &plan, draw);
+            let loss = self.state.map.model().evaluate(&mut self.context, exposure, &plan, draw);
             if loss.terms.total() < least {
                 (best, least) = (frame.clone(), loss.terms.total());
             }
@@ -331,7 +333,7 @@ impl BundleAdjustment {
     pub fn blur_px(&self, k: usize) -> f64 {
         let keyframe = &self.keyframes[k];
         let exposure = keyframe.observation.level(0).times.exposure;
-        self.state.frames[k].blur_px(&self.bench.sensor.camera, keyframe.depth, exposure)
+        self.state.frames[k].blur_px(&self.context.sensor.camera, keyframe.depth, exposure)
     }
 }
 

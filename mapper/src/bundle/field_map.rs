@@ -3,9 +3,10 @@
 use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
-use super::map_model::{MapModel, SeedView, Workbench};
-use super::moving::WorldMoves;
+use super::map_model::{FitContext, MapModel};
 use super::schedule::StepPlan;
+use super::seed_view::SeedView;
+use super::world_moves::WorldMoves;
 use crate::losses::{Exposure, ExposureLoss};
 use crate::map::{MapSize, Scene};
 use crate::sensor::Observation;
@@ -63,13 +64,13 @@ impl MapModel for FieldMap {
     }
 
     /// Grows the box; surfaces come with the steps.
-    fn seed(&mut self, _bench: &mut Workbench, view: &SeedView<'_>, _most: usize) {
+    fn seed(&mut self, _context: &mut FitContext, view: &SeedView<'_>, _most: usize) {
         self.make_room(view.seen, &view.world_from_camera);
     }
 
     fn evaluate(
         &self,
-        bench: &mut Workbench,
+        context: &mut FitContext,
         exposure: Exposure<'_>,
         plan: &StepPlan,
         draw: u64,
@@ -83,12 +84,12 @@ impl MapModel for FieldMap {
             seed: self.seed,
             step: draw,
         };
-        bench.field_engine.evaluate(&self.field, &given)
+        context.field_engine.evaluate(&self.field, &given)
     }
 
-    fn step(&mut self, bench: &mut Workbench, plan: &StepPlan) {
+    fn step(&mut self, context: &mut FitContext, plan: &StepPlan) {
         let step = FieldStep::default().scaled(plan.shrink);
-        self.adam.step(bench.level, &mut self.field, bench.field_engine.gradients(), step);
+        self.adam.step(context.level, &mut self.field, context.field_engine.gradients(), step);
     }
 
     /// The planes are as dense everywhere.

@@ -4,9 +4,10 @@ use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
 use super::ledger::Ledger;
-use super::map_model::{MapModel, SeedView, Workbench};
-use super::moving::{WorldMoves, move_gaussians};
+use super::map_model::{FitContext, MapModel};
 use super::schedule::StepPlan;
+use super::seed_view::SeedView;
+use super::world_moves::{WorldMoves, move_gaussians};
 use super::{adam, density, seeding};
 use crate::gaussians::Gaussians;
 use crate::losses::{Exposure, ExposureLoss};
@@ -37,10 +38,10 @@ impl MapModel for GaussianMap {
         MapSize::Gaussians(self.gaussians.len())
     }
 
-    fn seed(&mut self, bench: &mut Workbench, view: &SeedView<'_>, most: usize) {
-        bench.renderer.render(self.scene(), bench.sensor.camera, &view.world_from_camera);
+    fn seed(&mut self, context: &mut FitContext, view: &SeedView<'_>, most: usize) {
+        context.renderer.render(self.scene(), context.sensor.camera, &view.world_from_camera);
         let SeedView { index, .. } = view;
-        let (alpha, response) = (&bench.renderer.image.alpha, &bench.sensor.inverse_response);
+        let (alpha, response) = (&context.renderer.image.alpha, &context.sensor.inverse_response);
         let room = most.saturating_sub(self.gaussians.len());
         seeding::seed(&mut self.gaussians, view, response, alpha, room);
         self.ledger.enrol(self.gaussians.len(), *index);
@@ -48,16 +49,16 @@ impl MapModel for GaussianMap {
 
     fn evaluate(
         &self,
-        bench: &mut Workbench,
+        context: &mut FitContext,
         exposure: Exposure<'_>,
         plan: &StepPlan,
         _draw: u64,
     ) -> ExposureLoss {
-        bench.engine.evaluate(&self.gaussians, exposure, plan)
+        context.engine.evaluate(&self.gaussians, exposure, plan)
     }
 
-    fn step(&mut self, bench: &mut Workbench, plan: &StepPlan) {
-        let (gradients, drawn) = (bench.engine.gradients(), bench.engine.drawn());
+    fn step(&mut self, context: &mut FitContext, plan: &StepPlan) {
+        let (gradients, drawn) = (context.engine.gradients(), context.engine.drawn());
         let Self { gaussians, ledger } = self;
         adam::step(gaussians, &gradients.parameters, drawn, &plan.lengths, &mut ledger.moments);
         ledger.pull.add(&gradients.screen, drawn);

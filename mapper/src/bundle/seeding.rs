@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
-use super::map_model::SeedView;
+use super::seed_view::{DepthSource, SeedView};
 use super::smooth_depth::smooth_depth;
 use crate::gaussians::{Gaussian, Gaussians};
 use crate::infill;
@@ -24,15 +24,6 @@ const SPREAD: f32 = 0.5;
 const OPACITY: f32 = 0.9;
 /// A pixel is covered where the map's alpha is larger.
 pub(super) const COVERED: f32 = 0.5;
-
-/// Where the depth of new Gaussians comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DepthSource {
-    /// Pixels with a depth only.
-    Measured,
-    /// Pixels without a depth get one from their surroundings.
-    Completed,
-}
 
 /// Largest squares that have a pixel which is not covered, row by row.
 fn open_blocks(seen: &Observation, alpha: &[f32]) -> Vec<bool> {

@@ -17,6 +17,7 @@ use super::project::{Projected, project};
 use super::project_backward::{GradientRange, SplatGradients, ViewSums, project_backward};
 use super::tile::TileGrid;
 use super::view::RasterView;
+use super::view_share::ViewShare;
 use crate::gaussians::{Gaussians, PARAMETERS};
 
 /// Gaussians per piece of work of the projection and its backward pass.
@@ -47,39 +48,6 @@ pub struct RasterScratch {
 /// What pieces of Gaussians give to the poses of views, piece by piece.
 #[derive(Debug, Default)]
 pub(crate) struct PoseSums(Vec<ViewSums>);
-
-/// How the gradient by an image is that by one of the views that it shows.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ViewShare<'a> {
-    /// Weight of the view in the colour of the image.
-    pub(crate) colour: ColourShare<'a>,
-    /// Whether depth and alpha of the image are those of the view; else they do not depend on it.
-    pub(crate) geometry: bool,
-}
-
-/// Weight of a view in the colour of an image.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum ColourShare<'a> {
-    /// The same for all rows.
-    Same(f32),
-    /// One for every row of the image.
-    Rows(&'a [f32]),
-}
-
-impl ColourShare<'_> {
-    /// The weight in a row of the image.
-    pub(super) fn of_row(self, row: usize) -> f32 {
-        match self {
-            Self::Same(weight) => weight,
-            Self::Rows(weights) => weights[row],
-        }
-    }
-}
-
-impl ViewShare<'_> {
-    /// The image is the view.
-    const WHOLE: Self = Self { colour: ColourShare::Same(1.0), geometry: true };
-}
 
 /// Gradients of a loss by Gaussians, summed over views.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,9 +1,9 @@
 //! Rendered images, and gradients by them.
 
 use super::backward::{GradientCell, TileGradient};
-use super::driver::ViewShare;
 use super::forward::{PixelCell, TilePixels};
 use super::tile::{BLOCK_WIDTH, CELL, CELL_HEIGHT, CELLS, TILE_COLUMNS, TILE_HEIGHT, TILE_WIDTH, TileGrid};
+use super::view_share::ViewShare;
 
 /// A rendered view, or the gradient of a loss by one: five planes of numbers, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -26,10 +26,12 @@ mod reduce;
 pub mod reference;
 mod tile;
 mod view;
+mod view_share;
 
 pub(crate) use bands::BandView;
-pub(crate) use driver::{ColourShare, PoseSums, ViewShare};
+pub(crate) use driver::PoseSums;
 pub use driver::{GaussianGradients, RasterScratch, Rasterizer};
 pub use image::RasterImage;
 pub(crate) use tile::TILE_HEIGHT;
 pub use view::RasterView;
+pub(crate) use view_share::{ColourShare, ViewShare};

@@ -7,16 +7,15 @@
 //!
 //! [`mapping`] goes on from there. [`continuity`] repairs exposures that do not fit their neighbours; [`bundle`] seeds
 //! [`gaussians`] from depth and adjusts them together with the path of every exposure. A step renders what the moving
-//! camera sees ([`exposure`], the mean of views of [`raster`]), compares it with the captured frame ([`losses`]) and
-//! takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can go on. The
-//! result is another [`run`], with a map.
-//!
-//! [`statistics`] summarises lists of figures.
+//! camera sees ([`exposure`], the mean of views of [`raster`]), compares it with the captured frame ([`losses`],
+//! [`sensor`]) and takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can
+//! go on. The result is another [`run`], with a map.
 //!
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
-//! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
-//! results with the truth. [`export`] writes runs in the formats of other programs.
+//! [`rendering`] makes images of a [`map`], with [`infill`] where it has nothing, and [`surfaces`] a [`mesh`];
+//! [`evaluation`] and [`image_folders`] compare results with the truth, [`statistics`] summarises. [`export`] writes runs
+//! in the formats of other programs.
 
 mod binary_file;
 pub mod bundle;

@@ -1,4 +1,4 @@
-//! Meshes of coloured triangles: what they are, their files, and the depth that a camera sees of one.
+//! Meshes of coloured triangles: what they are, their files (PLY, GLB, OBJ), and the depth that a camera sees of one.
 
 mod depth_image;
 mod file;

@@ -1,9 +1,8 @@
-//! Surfaces: coloured triangles, where they come from, and their files (PLY, GLB, OBJ).
+//! Surfaces of maps as meshes.
 //!
 //! A [`Mesh`] comes from what cameras see of a map ([`ViewSource`], for Gaussians [`MapViews`]) by [`fuse_views`], or
 //! from a signed distance that is known everywhere by [`mesh_from_field`]. [`Sight`] drops what no camera has seen and
-//! gives colours to the rest; [`surface_of_views`] does all of that, and [`surface_of_field`] for a tri-plane field. The
-//! other way round, [`depth_image`] is what a camera sees of a mesh.
+//! gives colours to the rest; [`surface_of_views`] does all of that, and [`surface_of_field`] for a tri-plane field.
 
 mod components;
 mod error;

@@ -204,3 +204,20 @@ impl PlanesMut<'_> {
         (Self { planes: heads }, Self { planes: tails })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn planes_of_unequal_length_are_no_map() {
+        #[derive(serde::Serialize)]
+        struct Plane(#[serde(with = "exact_floats")] Vec<f32>);
+        let stored = |planes: &[Plane; PARAMETERS]| postcard::to_stdvec(planes).unwrap();
+        let equal = core::array::from_fn(|_| Plane(vec![1.0; 3]));
+        assert_eq!(postcard::from_bytes::<Gaussians>(&stored(&equal)).unwrap().len(), 3);
+        let last_is_short =
+            core::array::from_fn(|k| Plane(vec![1.0; if k + 1 < PARAMETERS { 3 } else { 2 }]));
+        assert!(postcard::from_bytes::<Gaussians>(&stored(&last_is_short)).is_err());
+    }
+}

@@ -17,46 +17,38 @@
 //! [`evaluation`] and [`image_folders`] compare results with the truth, [`statistics`] summarises. [`export`] writes runs
 //! in the formats of other programs.
 
-mod binary_file;
 pub mod bundle;
-pub mod checkpoint;
+pub use mba_io::checkpoint;
 pub mod continuity;
-pub mod dataset;
+pub use mba_io::dataset;
 pub mod deblurring;
-mod error;
 pub mod evaluation;
 pub mod export;
 pub mod exposure;
-mod file_kind;
 pub mod gaussians;
 pub mod image_folders;
-pub mod imu;
+pub use mba_io::imu;
 pub mod infill;
 pub mod losses;
 pub mod map;
 pub mod mapping;
-pub mod mesh;
-pub mod output;
+pub use mba_io::mesh;
+pub use mba_io::output;
 pub mod places;
-mod ply;
-mod png;
 pub mod pose_graph;
 pub mod raster;
 pub mod rendering;
 pub mod run;
-mod run_layout;
 pub mod self_calibration;
 pub mod sensor;
 pub mod slam;
-pub mod statistics;
+pub use mba_io::statistics;
 pub mod surfaces;
-pub mod synth;
-mod text_lines;
+pub use mba_synth as synth;
 pub mod tracking;
-pub mod trajectory_file;
+pub use mba_io::trajectory_file;
 pub mod triplane;
 mod uncertainty;
-mod whole_file;
 
-pub use binary_file::BinaryFileError;
-pub use error::FileError;
+pub use mba_io::BinaryFileError;
+pub use mba_io::FileError;

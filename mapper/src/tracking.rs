@@ -3,6 +3,8 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use mba_io::dataset::{Dataset, FrameError, RgbdFrame};
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::error::{ConfigError, FrameError as TrackError};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
@@ -11,9 +13,7 @@ use mba_tracker::{
     Doubt, Frame, FrameResult, GyroReading, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig,
 };
 
-use crate::dataset::{Dataset, FrameError, RgbdFrame};
 use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
-use crate::trajectory_file::TimedExposure;
 use crate::uncertainty::Uncertainty;
 
 /// What can be chosen about the tracker; everything else follows from the data set.

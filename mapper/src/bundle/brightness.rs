@@ -1,11 +1,11 @@
 //! How much brighter one frame is than another: automatic exposure changes from frame to frame, and a map has one light.
 
+use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
 
 use crate::losses::CLIPPED;
 use crate::sensor::Observation;
-use crate::statistics::quantile;
 
 /// Every so many columns and rows a point is compared.
 const STRIDE: usize = 5;

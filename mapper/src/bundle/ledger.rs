@@ -1,9 +1,9 @@
 //! What is kept of every Gaussian besides its parameters.
 
+use mba_io::checkpoint::exact_floats;
 use serde::{Deserialize, Serialize};
 
 use super::adam::Moments;
-use crate::checkpoint::exact_floats;
 use crate::gaussians::Gaussian;
 
 /// One entry per Gaussian of the map, in the map's order.

@@ -1,5 +1,6 @@
 //! The smooth path through a part of the sequence, and what it says about every exposure on it.
 
+use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::geometry::so3;
 use nalgebra::Vector3;
@@ -11,7 +12,6 @@ use super::problem::{Observation, Problem};
 use super::scales::{Sample, typical_derivatives};
 use super::screening::judge;
 use super::spline::{Knots, MEETING_POINTS, Part, Path, meeting_times};
-use crate::statistics::quantile;
 
 /// Frames from which a path tells which of them is wrong.
 pub(super) const FEWEST_FRAMES: usize = 5;

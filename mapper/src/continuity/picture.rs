@@ -3,13 +3,13 @@
 //! Both pictures are blurred, each along its own path. Blurring each once more along the path of the other makes them
 //! equal where the paths are right, without any sharp picture: blur along one path commutes with blur along another.
 
+use mba_io::statistics::quantile;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use nalgebra::Vector3;
 
 use super::evidence::Mismatch;
 use crate::exposure::RowTimes;
-use crate::statistics::quantile;
 
 /// Virtual views of each path.
 const VIEWS: usize = 13;

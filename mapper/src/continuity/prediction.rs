@@ -1,5 +1,6 @@
 //! The motion during an exposure that the neighbours of a frame suggest: a prior for bundle adjustment.
 
+use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Vector3, Vector6};
 
@@ -7,7 +8,6 @@ use super::repair::usual_interval;
 use super::scales::{MEDIAN_NORM_3, Sample, derivative};
 use super::spline::Part;
 use super::{ContinuityFrame, ContinuitySettings};
-use crate::statistics::quantile;
 
 /// Nothing is known more exactly than this, in metres or radians.
 const LEAST_SIGMA: f64 = 1e-4;

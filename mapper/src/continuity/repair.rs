@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use mba_io::statistics::quantile;
 use mba_tracker::trajectory::ExposureTrajectory;
 use rayon::prelude::*;
 
@@ -9,7 +10,6 @@ use super::fit::{FEWEST_FRAMES, Fit, fit};
 use super::frame::validate;
 use super::measured::{Held, Measured};
 use super::{ContinuityError, ContinuityFrame, ContinuitySettings, Evidence, Suspicion};
-use crate::statistics::quantile;
 
 /// Frames to either side that a suspected one is compared with.
 const REFERENCES_PER_SIDE: usize = 2;

@@ -1,10 +1,10 @@
 //! How a sequence usually moves, told by its mid-exposure poses, which do not depend on the direction of time.
 
+use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::Vector3;
 
 use super::spline::Part;
-use crate::statistics::quantile;
 
 /// Median length of a vector of three standard normal numbers.
 pub(super) const MEDIAN_NORM_3: f64 = 1.538;

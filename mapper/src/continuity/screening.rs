@@ -3,6 +3,7 @@
 //! A jolt of the hand is as rare and as large as an outlier, and tells itself apart by the velocities: those of the
 //! exposures before and after a jolt agree with it. The path alone could follow either.
 
+use mba_io::statistics::quantile;
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::ContinuitySettings;
@@ -10,7 +11,6 @@ use super::direction::reversed_exposures;
 use super::measured::{Judgement, Measured};
 use super::scales::{MEDIAN_NORM_3, Sample, derivative, typical_derivatives};
 use super::spline::Part;
-use crate::statistics::quantile;
 
 /// Error of a prediction from both sides, and from one, in units of jerk × (time to the neighbour)³.
 const BRIDGED_ERROR: f64 = 0.05;

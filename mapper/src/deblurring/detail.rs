@@ -6,13 +6,13 @@
 //! map has it. Noise is held back where the left-over is no more than noise (Wiener's gain in a window). So a frame that was
 //! captured sharp is not spoilt by the map, and the map decides where nothing else can.
 
+use mba_io::dataset::RgbdFrame;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::deblur::{BLOCK_HEIGHT, BLOCK_WIDTH, BlurFlow, DeblurScratch, blur_along, tap_count};
 use mba_tracker::keyframe::RectifyScratch;
 use mba_tracker::workspace::Arena;
 
 use super::keyframe::{DeblurError, DeblurMemory, FramePath, KeyframeDeblurrer, Surface};
-use crate::dataset::RgbdFrame;
-use crate::trajectory_file::TimedExposure;
 
 /// Landweber iterations: one brings back what is hardly blurred, a second the first order of what is; more fit noise.
 const ITERATIONS: usize = 2;

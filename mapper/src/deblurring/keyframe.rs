@@ -1,5 +1,7 @@
 //! Deblurring one colour image with the motion that was estimated for it.
 
+use mba_io::dataset::{FrameError, RgbdFrame};
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::deblur::DeblurScratch;
 use mba_tracker::error::FrameError as ImageError;
 use mba_tracker::geometry::PinholeCamera;
@@ -12,9 +14,7 @@ use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
 use mba_tracker::workspace::{ARENA_ALIGNMENT, Arena, WorkspaceError, slice_bytes};
 use mba_tracker::{Readout, SimdLevel, TrackerConfig};
 
-use crate::dataset::{FrameError, RgbdFrame};
 use crate::sensor::ForwardResponse;
-use crate::trajectory_file::TimedExposure;
 
 /// Longest motion within an image, pixels, that is worth deblurring: below, rounding to bytes and noise hide it;
 /// above, the virtual views lie too far apart to describe it.
@@ -284,7 +284,7 @@ fn median_measured(values: &[f32]) -> f32 {
 pub(super) mod tests {
     use super::*;
     use crate::evaluation::psnr;
-    use crate::synth::{SynthConfig, SynthSequence};
+    use mba_synth::{SynthConfig, SynthSequence};
 
     pub(in crate::deblurring) fn timed(path: &ExposureTrajectory) -> TimedExposure {
         TimedExposure { timestamp: 0.0, start: path.start, mid: path.mid(), end: path.end }

@@ -4,7 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use thiserror::Error;
 
-use crate::trajectory_file::TimedPose;
+use mba_io::trajectory_file::TimedPose;
 
 /// Singular values below this share of the largest count as zero; text files with nine decimals of a straight
 /// path stay below it, any bend of a real path stays far above.

@@ -1,12 +1,12 @@
 //! How well the motion within the exposure was found.
 
+use mba_io::statistics::quantile;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::trajectory::ExposureTrajectory;
 
 use super::associate;
 use crate::exposure::{blur_length, motion_of};
-use crate::statistics::quantile;
-use crate::trajectory_file::TimedExposure;
 
 /// Frames with less true blur than this, in pixels, say nothing about a relative error or a direction.
 pub const MIN_TRUE_BLUR_PX: f64 = 5.0;

@@ -1,9 +1,9 @@
 //! The figures of an evaluation in the form that files and `--json` carry.
 
+use mba_io::statistics::Statistics;
 use serde::{Deserialize, Serialize};
 
 use super::{BlurEvaluation, TrajectoryEvaluation};
-use crate::statistics::Statistics;
 
 /// Figures of merit of a trajectory; the unit is part of the name.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

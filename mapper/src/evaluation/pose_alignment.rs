@@ -1,12 +1,12 @@
 //! Alignment of two trajectories by positions and orientations.
 
+use mba_io::trajectory_file::TimedPose;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Matrix3, Vector3};
 use thiserror::Error;
 
 use super::alignment::nearest_rotation;
 use super::association::associate;
-use crate::trajectory_file::TimedPose;
 
 /// Why two trajectories cannot be aligned.
 #[derive(Clone, Debug, PartialEq, Error)]

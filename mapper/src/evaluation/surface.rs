@@ -1,9 +1,9 @@
 //! How well two surfaces, given by points on them, agree.
 
+use mba_io::statistics::{Statistics, share_within};
 use serde::{Deserialize, Serialize};
 
 use super::kd_tree::{KdTree, distance};
-use crate::statistics::{Statistics, share_within};
 
 /// Points of the reference from which its spacing is taken.
 const SPACING_SAMPLES: usize = 10_000;

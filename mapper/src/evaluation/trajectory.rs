@@ -4,10 +4,10 @@ use mba_tracker::geometry::{RigidTransform, so3};
 use nalgebra::Vector3;
 use thiserror::Error;
 
-use crate::trajectory_file::TimedPose;
+use mba_io::statistics::{Statistics, share_within};
+use mba_io::trajectory_file::TimedPose;
 
 use super::{Alignment, AlignmentError, DEFAULT_MAX_DT, Match, Similarity, align, associate};
-use crate::statistics::{Statistics, share_within};
 
 /// A frame whose position error is at most this many metres counts as good: one bad frame can decide an RMSE, it
 /// cannot decide this share.

@@ -7,8 +7,9 @@
 
 use std::fmt::Write as _;
 
+use mba_io::mesh::Mesh;
+
 use super::{PIXEL_CENTRE, PosedFrame, image_name};
-use crate::mesh::Mesh;
 use crate::run::RunCamera;
 
 /// Name of the file of cameras.

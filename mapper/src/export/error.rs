@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::FileError;
-use crate::dataset::{FrameError, InvalidValue};
-use crate::output::OutputError;
+use mba_io::FileError;
+use mba_io::dataset::{FrameError, InvalidValue};
+use mba_io::output::OutputError;
 
 /// A run cannot be exported.
 #[derive(Debug, thiserror::Error)]

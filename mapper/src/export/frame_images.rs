@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use mba_io::dataset::{Dataset, FrameError, read_image};
 use mba_tracker::geometry::PinholeCamera;
 
 use super::{DEPTH_UNIT, ExportError, PosedFrame};
-use crate::dataset::{Dataset, FrameError, read_image};
 use crate::run::{DEPTH_FOLDER, Run, RunCamera, deblurred_path};
 
 /// Largest difference between the times of a frame in the run and in the data set, seconds.

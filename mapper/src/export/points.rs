@@ -1,11 +1,11 @@
 //! Sparse clouds of points, from which other programs start.
 
+use mba_io::mesh::Mesh;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::photometric::InverseResponse;
 
 use super::frame_images::FrameImages;
 use crate::gaussians::Gaussians;
-use crate::mesh::Mesh;
 use crate::sensor::ForwardResponse;
 
 /// Logit of the opacity of one tenth. What is fainter shows no surface by itself.

@@ -1,5 +1,9 @@
 //! Images with cameras and points, for programs that make a scene of them.
 
+use mba_io::dataset::{Dataset, InvalidValue};
+use mba_io::mesh::{Mesh, format_mesh};
+use mba_io::output::ExportFolder;
+use mba_io::png::{encode_depth, encode_rgb};
 use rayon::prelude::*;
 
 use super::frame_images::{FrameImages, ImageReader, check_data_set};
@@ -8,11 +12,7 @@ use super::{
     CAMERAS_FILE, ExportError, IMAGES_FILE, POINTS_FILE, POINTS3D_FILE, PosedFrame, PosedFrames,
     TRANSFORMS_FILE, format_cameras, format_images, format_points3d, format_transforms, image_name,
 };
-use crate::dataset::{Dataset, InvalidValue};
 use crate::gaussians::Gaussians;
-use crate::mesh::{Mesh, format_mesh};
-use crate::output::ExportFolder;
-use crate::png::{encode_depth, encode_rgb};
 use crate::run::{Run, RunCamera};
 
 /// Frames whose images are read and encoded at the same time.

@@ -3,16 +3,16 @@
 use std::fs;
 use std::path::Path;
 
+use mba_io::mesh::read_mesh;
+use mba_io::output::{ExportFolder, Permission};
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{UnitQuaternion, Vector3};
 use tempfile::TempDir;
 
 use super::*;
 use crate::gaussians::{Gaussian, Gaussians};
-use crate::mesh::read_mesh;
-use crate::output::{ExportFolder, Permission};
 use crate::run::{FrameRecord, FrameStatus, Run, RunCamera, RunResponse, RunSettings, RunWriter};
-use crate::trajectory_file::TimedExposure;
 
 /// Columns and rows.
 const SIZE: [usize; 2] = [4, 2];

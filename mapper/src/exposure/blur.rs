@@ -3,7 +3,7 @@
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use crate::trajectory_file::TimedExposure;
+use mba_io::trajectory_file::TimedExposure;
 
 /// Points per image axis at which a blur length is sampled.
 const GRID: usize = 5;

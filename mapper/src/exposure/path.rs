@@ -4,7 +4,7 @@ use mba_tracker::geometry::{RigidTransform, so3};
 use mba_tracker::trajectory::ExposureTrajectory;
 use nalgebra::{SMatrix, Vector6};
 
-use crate::trajectory_file::TimedExposure;
+use mba_io::trajectory_file::TimedExposure;
 
 /// Number of parameters of a path: tangents of the pose at opening, of that at closing, and the bow.
 pub const PATH_PARAMETERS: usize = 18;

@@ -3,7 +3,7 @@
 use serde::de::{Deserialize, Deserializer, Error};
 use serde::ser::{Serialize, Serializer};
 
-use crate::checkpoint::exact_floats;
+use mba_io::checkpoint::exact_floats;
 
 /// Number of parameters of a Gaussian.
 pub const PARAMETERS: usize = 14;

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use mba_io::dataset::Dataset;
 use rayon::prelude::*;
 
 use super::error::ImageFolderError;
 use super::figures::{ColourFigures, ColourMean, DepthFigures, FolderFigures, ImageFigures, Unpaired};
 use super::stored::{Pixels, StoredImage, list};
-use crate::dataset::Dataset;
 use crate::evaluation::{DepthDifference, ImageError, depth_difference};
 
 /// What is compared.

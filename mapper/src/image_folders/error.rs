@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-use crate::FileError;
-use crate::dataset::FrameError;
+use mba_io::FileError;
+use mba_io::dataset::FrameError;
+
 use crate::evaluation::ImageError;
 
 /// Two folders of images, or two of their images, cannot be compared.

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use image::{ColorType, DynamicImage};
 
-use crate::FileError;
-use crate::dataset::{FrameError, read_image};
+use mba_io::FileError;
+use mba_io::dataset::{FrameError, read_image};
 
 /// An image as it is compared.
 pub(super) struct StoredImage {

@@ -1,14 +1,14 @@
 //! Frames between keyframes: fitted to the finished map.
 
+use mba_io::dataset::Dataset;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::geometry::RigidTransform;
 
 use super::MapSettings;
 use super::observations::{observation, sensor};
 use super::prepare::Frames;
 use crate::bundle::{BundleAdjustment, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
-use crate::dataset::Dataset;
 use crate::run::FrameStatus;
-use crate::trajectory_file::TimedExposure;
 
 /// Steps per frame.
 const STEPS: usize = 24;

@@ -3,16 +3,16 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
+use mba_io::dataset::Dataset;
+use mba_io::output::OutputFolder;
 use serde::{Deserialize, Serialize};
 
 use super::between::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, merit, output};
 use crate::bundle::{BundleAdjustment, BundleState};
-use crate::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
-use crate::dataset::Dataset;
 use crate::map::MapSize;
-use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
 
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.

@@ -1,6 +1,7 @@
 //! Why there is no map.
 
-use crate::checkpoint::CheckpointError;
+use mba_io::checkpoint::CheckpointError;
+
 use crate::continuity::ContinuityError;
 use crate::run::RunError;
 

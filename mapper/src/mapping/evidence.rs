@@ -1,10 +1,10 @@
 //! What the frames of a data set show about two exposures.
 
+use mba_io::dataset::Dataset;
 use mba_tracker::trajectory::ExposureTrajectory;
 
 use super::observations::{observation_of, sensor};
 use crate::continuity::{FramePicture, Mismatch, Suspicion, compare_exposures};
-use crate::dataset::Dataset;
 use crate::exposure::RowTimes;
 use crate::sensor::{Observation, Sensor};
 

@@ -3,15 +3,16 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use mba_io::dataset::Dataset;
+use mba_io::trajectory_file::TimedExposure;
+
 use super::between::Fit;
 use super::driver::{Adjustment, BUDGET_RESERVE, Checkpoint, Conclusion, Running};
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
 use crate::bundle::{BundleAdjustment, DepthSource, Schedule};
-use crate::dataset::Dataset;
 use crate::map::MapKind;
 use crate::run::{FrameRecord, RunWriter, Summary};
-use crate::trajectory_file::TimedExposure;
 
 /// Work per keyframe, in virtual views of full resolution.
 const EFFORT: f64 = 24.0;

@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
+use mba_io::dataset::{Dataset, read_image};
+use mba_io::trajectory_file::{TimedExposure, TimedPose, read_trajectory};
+
 use crate::bundle::BundleAdjustment;
-use crate::dataset::{Dataset, read_image};
 use crate::evaluation::{DEFAULT_MAX_DT, align_poses, psnr, ssim};
 use crate::rendering::{Behind, RenderedView, ViewRenderer};
 use crate::run::{MapFigures, deblurred_path, mid_pose};
-use crate::trajectory_file::{TimedExposure, TimedPose, read_trajectory};
 
 /// Name of a data set's folder of sharp images, one per frame or for some frames, named by the frame's index.
 const SHARP_FOLDER: &str = "sharp";

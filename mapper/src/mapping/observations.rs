@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::dataset::Dataset;
+use mba_io::dataset::Dataset;
+
 use crate::exposure::RowTiming;
 use crate::sensor::{ObservationPyramid, Sensor};
 

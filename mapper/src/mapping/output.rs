@@ -2,17 +2,17 @@
 
 use std::fs;
 
+use mba_io::dataset::{Dataset, RgbdFrame};
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::SimdLevel;
 use rayon::prelude::*;
 
 use super::prepare::Frames;
 use crate::bundle::BundleAdjustment;
-use crate::dataset::{Dataset, RgbdFrame};
 use crate::deblurring::{DeblurMemory, KeyframeDeblurrer, LONGEST_BLUR, Reblurred};
 use crate::rendering::{Behind, ViewRenderer};
 use crate::run::{RunError, RunWriter};
 use crate::tracking::{TrackingOptions, tracker_config};
-use crate::trajectory_file::TimedExposure;
 
 /// Fills a run with the poses that it starts from, and brings its folder up to date: from here on it replaces an
 /// earlier one.

@@ -1,5 +1,8 @@
 //! From a run to a bundle that can be adjusted.
 
+use mba_io::dataset::Dataset;
+use mba_io::statistics::quantile;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::SimdLevel;
 use nalgebra::Vector6;
 use rayon::prelude::*;
@@ -11,12 +14,9 @@ use super::run_continuity::{RepairedRun, repair_run, run_frames};
 use super::{MapError, MapSettings};
 use crate::bundle::{BundleAdjustment, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
 use crate::continuity::{ContinuitySettings, FrameVerdict, Suspicion, predict_motions};
-use crate::dataset::Dataset;
 use crate::exposure::{ExposurePath, motion_of};
 use crate::run::{FrameRecord, FrameStatus, Run};
 use crate::sensor::Sensor;
-use crate::statistics::quantile;
-use crate::trajectory_file::TimedExposure;
 
 /// Largest difference between the times of a frame in the run and in the data set, seconds.
 const SAME_TIME: f64 = 1e-4;

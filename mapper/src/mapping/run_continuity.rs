@@ -1,5 +1,7 @@
 //! Continuity of a recorded run.
 
+use mba_io::statistics::quantile;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::trajectory::ExposureTrajectory;
 
 use crate::continuity::{
@@ -7,8 +9,6 @@ use crate::continuity::{
 };
 use crate::exposure::motion_of;
 use crate::run::{FrameRecord, FrameStatus};
-use crate::statistics::quantile;
-use crate::trajectory_file::TimedExposure;
 
 /// How much less exactly a frame is known that was aligned with few inliers or a large residual.
 const WEAK_FACTOR: f64 = 3.0;

@@ -2,11 +2,11 @@
 
 use std::sync::LazyLock;
 
+use mba_synth::{CameraMotion, DepthSensor, NoiseModel, SynthConfig, SynthSequence};
 use mba_tracker::geometry::{RigidTransform, so3};
 use nalgebra::Vector3;
 
 use super::{PlaceDescriptor, PlaceError, PlaceIndex};
-use crate::synth::{CameraMotion, DepthSensor, NoiseModel, SynthConfig, SynthSequence};
 
 const PLACES: usize = 12;
 

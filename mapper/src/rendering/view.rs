@@ -7,14 +7,15 @@ use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::photometric::InverseResponse;
 
+use mba_io::FileError;
+use mba_io::png::{encode_depth, encode_rgb};
+use mba_io::whole_file::write_together;
 use rayon::prelude::*;
 
+use crate::infill;
 use crate::map::{Scene, SceneRenderer};
-use crate::png::{encode_depth, encode_rgb};
 use crate::raster::RasterImage;
 use crate::sensor::ForwardResponse;
-use crate::whole_file::write_together;
-use crate::{FileError, infill};
 
 /// Above this alpha a pixel shows the map, below it mostly what is behind: nothing, and no depth.
 pub const SOLID_ALPHA: f32 = 0.5;

@@ -4,7 +4,7 @@ use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::photometric::InverseResponse;
 use serde::{Deserialize, Serialize};
 
-use crate::dataset::{Calibration, InvalidValue, Response, check_camera, check_positive};
+use mba_io::dataset::{Calibration, InvalidValue, Response, check_camera, check_positive};
 
 /// Units of depth per metre of the TUM benchmark, for cameras of which nothing is known.
 const TUM_DEPTH_SCALE: f64 = 5000.0;

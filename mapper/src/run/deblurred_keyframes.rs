@@ -1,12 +1,12 @@
 //! The keyframes of a run, all at once.
 
+use mba_io::dataset::Dataset;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::{SimdLevel, TrackerConfig};
 use rayon::prelude::*;
 
 use super::{RunError, RunWriter};
-use crate::dataset::Dataset;
 use crate::deblurring::{DeblurError, DeblurMemory, KeyframeDeblurrer};
-use crate::trajectory_file::TimedExposure;
 
 /// Why a keyframe has no image.
 #[derive(Debug, thiserror::Error)]

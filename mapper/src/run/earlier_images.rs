@@ -3,8 +3,9 @@
 use std::fs;
 use std::path::Path;
 
+use mba_io::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER};
+
 use super::RunError;
-use crate::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER};
 
 /// Removes the images of an earlier run in `folder`, and nothing else.
 pub(super) fn remove_keyframe_images(folder: &Path) -> Result<(), RunError> {

@@ -3,8 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::FileError;
-use crate::output::OutputError;
+use mba_io::FileError;
+use mba_io::output::OutputError;
 
 /// A RUN folder cannot be read or written.
 #[derive(Debug, thiserror::Error)]

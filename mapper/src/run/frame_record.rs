@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
+use mba_io::whole_file::read_text;
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
-use crate::whole_file::read_text;
 
 /// How far a frame's pose can be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

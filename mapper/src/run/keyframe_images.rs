@@ -3,10 +3,11 @@
 use std::fs;
 use std::io;
 
+use mba_io::png::{encode_depth, encode_rgb};
+use mba_io::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER};
+use mba_io::whole_file::write_together;
+
 use super::{RunError, RunWriter};
-use crate::png::{encode_depth, encode_rgb};
-use crate::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER};
-use crate::whole_file::write_together;
 
 impl RunWriter {
     /// Writes the deblurred image of keyframe `index`: `rgb` holds red, green, blue of each of `width * height`

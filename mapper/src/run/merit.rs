@@ -1,10 +1,11 @@
 //! Figures of merit of a run whose data set has ground truth.
 
-use crate::dataset::{Dataset, survey};
+use mba_io::dataset::{Dataset, survey};
+use mba_io::trajectory_file::{TimedExposure, TimedPose};
+
 use crate::evaluation::{
     BlurFigures, DEFAULT_MAX_DT, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
 };
-use crate::trajectory_file::{TimedExposure, TimedPose};
 
 /// Frames from which the median depth of a data set is taken.
 const SAMPLED_FRAMES: usize = 16;

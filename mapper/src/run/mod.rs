@@ -34,7 +34,7 @@ pub(crate) use rows::RunRows;
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 
-pub use crate::run_layout::{
+pub use mba_io::run_layout::{
     CHECKPOINT_FILE, DEBLURRED_FOLDER, DEPTH_FOLDER, EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE,
     TRAJECTORY_FILE, deblurred_path,
 };

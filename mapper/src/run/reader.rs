@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use mba_io::trajectory_file::{TimedExposure, read_exposures};
+use mba_io::whole_file::read_text;
+
 use super::{EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE};
 use super::{FrameRecord, RunError, Summary, frame_record};
-use crate::trajectory_file::{TimedExposure, read_exposures};
-use crate::whole_file::read_text;
 
 /// A run as its folder tells it.
 #[derive(Clone, Debug)]

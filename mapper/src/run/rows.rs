@@ -1,10 +1,10 @@
 //! What a run has recorded, as a checkpoint keeps it.
 
+use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
+use mba_io::trajectory_file::TimedExposure;
 use serde::{Deserialize, Serialize};
 
 use super::{FrameRecord, RunError, RunWriter};
-use crate::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
-use crate::trajectory_file::TimedExposure;
 
 /// Everything that a [`RunWriter`] was told.
 #[derive(Clone, Debug, Serialize, Deserialize)]

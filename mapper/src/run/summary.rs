@@ -1,10 +1,10 @@
 //! `summary.json`.
 
+use mba_io::statistics::quantile;
 use serde::{Deserialize, Serialize};
 
 use super::{FrameRecord, FrameStatus, RunCamera};
 use crate::evaluation::{BlurFigures, TrajectoryFigures};
-use crate::statistics::quantile;
 
 /// Version of the summary's layout.
 const FORMAT: u32 = 1;

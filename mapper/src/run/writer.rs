@@ -4,6 +4,9 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
+use mba_io::output::{OutputFolder, Permission};
+use mba_io::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
+use mba_io::whole_file::write_together;
 use mba_tracker::geometry::RigidTransform;
 
 use super::earlier_images::remove_keyframe_images;
@@ -14,10 +17,7 @@ use super::{
 };
 use crate::gaussians::write_ply;
 use crate::map::{FIELD_FILE, MAP_FILE, Scene, StoredMap};
-use crate::output::{OutputFolder, Permission};
-use crate::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use crate::triplane::write_field;
-use crate::whole_file::write_together;
 
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
 const FRAMES_PER_FLUSH: usize = 50;

@@ -1,5 +1,6 @@
 //! Completing a data set: exposure and readout times that are not on record.
 
+use mba_io::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
 use mba_tracker::geometry::PinholeCamera;
 
 use super::depth_time::{self, Measured};
@@ -9,7 +10,6 @@ use super::finding::{Finding, Value};
 use super::readout::{ReadoutSearch, depth_readout};
 use super::robust::median;
 use super::window::{Guess, Probe, Recording, Resolution, Window};
-use crate::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
 use crate::tracking::TrackingOptions;
 
 /// Fewest frames that can tell anything.

@@ -5,12 +5,12 @@
 
 use std::sync::Arc;
 
+use mba_io::dataset::RgbdFrame;
 use mba_tracker::geometry::PinholeCamera;
 use nalgebra::{Vector3, Vector6};
 
 use super::motion::motion;
 use super::window::Tracked;
-use crate::dataset::RgbdFrame;
 
 /// Pixels between the two depths of a jump: a sensor leaves out the pixels on the edge itself.
 const REACH: usize = 4;

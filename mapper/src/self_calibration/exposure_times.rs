@@ -1,9 +1,10 @@
 //! Exposure times of all frames: the ones with which tracking finds as much motion within exposures as between them.
 
+use mba_io::dataset::{Knowledge, LONGEST_ASSUMED_EXPOSURE};
+
 use super::brightness::relative_brightness;
 use super::exposure::{self, PixelScale};
 use super::window::{Guess, Probe, Resolution, Tracked, Window};
-use crate::dataset::{Knowledge, LONGEST_ASSUMED_EXPOSURE};
 
 /// Brightness explains the exposure times unless one time for all fits the motion better than it by this factor.
 const BRIGHTNESS_DOUBT: f64 = 1.25;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::dataset::Knowledge;
+use mba_io::dataset::Knowledge;
 
 /// A number that was found, with its standard deviation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

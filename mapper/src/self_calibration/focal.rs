@@ -1,11 +1,11 @@
 //! Focal length: the one with which the frames fit each other best.
 
+use mba_io::dataset::{Dataset, Knowledge};
 use rayon::prelude::*;
 
 use super::finding::{Finding, Value};
 use super::score::{advantage, misfits, parabola, trimmed_mean};
 use super::window::{Guess, Recording};
-use crate::dataset::{Dataset, Knowledge};
 use crate::tracking::TrackingOptions;
 
 /// Frames that are tracked with each focal length, at the most.

@@ -2,7 +2,7 @@
 
 use mba_tracker::geometry::PinholeCamera;
 
-use crate::dataset::RgbdFrame;
+use mba_io::dataset::RgbdFrame;
 
 /// Least width of a reduced picture, pixels.
 const WIDTH: usize = 300;

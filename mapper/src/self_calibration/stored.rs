@@ -4,12 +4,13 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::exposure_times::SHORTEST;
-use crate::FileError;
-use crate::dataset::{
+use mba_io::FileError;
+use mba_io::dataset::{
     CameraFact, Dataset, DatasetError, ExposureSource, Knowledge, read_calibration, read_exposure_times,
     write_calibration, write_exposure_times,
 };
+
+use super::exposure_times::SHORTEST;
 
 /// Name of the calibration with what was estimated; its list `estimated` tells what that is.
 pub const ESTIMATED_FILE: &str = "calibration_estimated.toml";
@@ -155,8 +156,8 @@ fn check_times(path: &Path, times: &[f64], dataset: &Dataset) -> Result<(), Stor
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dataset::{Calibration, open};
-    use crate::synth::{SynthConfig, SynthSequence, write_dataset};
+    use mba_io::dataset::{Calibration, open};
+    use mba_synth::{SynthConfig, SynthSequence, write_dataset};
 
     fn three_frames(folder: &Path) -> Dataset {
         let config =

@@ -3,6 +3,7 @@
 use std::borrow::Borrow;
 use std::ops::Range;
 
+use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::trajectory::ExposureTrajectory;
 use mba_tracker::{FrameResult, FrameStatus, SimdLevel, Tracker, TrackerConfig};
@@ -10,7 +11,6 @@ use rayon::prelude::*;
 
 use super::reduced::{reduced, usual_level};
 use super::robust::median;
-use crate::dataset::{Dataset, RgbdFrame};
 use crate::tracking::{TrackingOptions, reduced_tracker_config, tracker_view};
 
 /// What is supposed about the camera while the window is tracked.

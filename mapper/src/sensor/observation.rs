@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use mba_io::dataset::RgbdFrame;
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::InverseResponse;
 use rayon::prelude::*;
 
 use super::forward_response::ForwardResponse;
-use crate::dataset::RgbdFrame;
 use crate::exposure::{RowTimes, RowTiming};
 
 /// A captured frame at one resolution.

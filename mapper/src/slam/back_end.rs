@@ -3,6 +3,9 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
+use mba_io::checkpoint::exact_poses::{numbers, pose};
+use mba_io::dataset::{Dataset, RgbdFrame};
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::RigidTransform;
 
@@ -14,12 +17,9 @@ use super::progress::SlamProgress;
 use super::saved::{Counts, Keeper, MapperParts, Replay, SavedKeyframe};
 use super::settings::{Arrival, SlamReference, SlamSettings};
 use crate::bundle::{BundleState, Keyframe, PathPrior};
-use crate::checkpoint::exact_poses::{numbers, pose};
-use crate::dataset::{Dataset, RgbdFrame};
 use crate::mapping::sensor;
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
 use crate::sensor::{ObservationPyramid, Sensor};
-use crate::trajectory_file::TimedExposure;
 
 /// Time after which the folder is brought up to date: a run that is killed loses no more.
 const FLUSH_EVERY: Duration = Duration::from_secs(2);

@@ -4,6 +4,9 @@ use std::ops::ControlFlow;
 use std::thread;
 use std::time::Instant;
 
+use mba_io::checkpoint::load;
+use mba_io::dataset::Dataset;
+use mba_io::output::OutputFolder;
 use mba_tracker::{SimdLevel, TrackerConfig};
 
 use super::back_end::{BackEnd, keyframe_images, keyframes};
@@ -15,10 +18,7 @@ use super::saved::{
 use super::settings::{Arrival, SlamSettings};
 use super::{SlamError, front_end};
 use crate::bundle::{BundleAdjustment, BundleState};
-use crate::checkpoint::load;
-use crate::dataset::Dataset;
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
-use crate::output::OutputFolder;
 use crate::run::{CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
 use crate::tracking::{TrackingError, tracker_config};
 

@@ -1,6 +1,7 @@
 //! Why SLAM stopped.
 
-use crate::checkpoint::CheckpointError;
+use mba_io::checkpoint::CheckpointError;
+
 use crate::mapping::MapError;
 use crate::run::RunError;
 use crate::tracking::TrackingError;

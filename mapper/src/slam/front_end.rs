@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use mba_io::dataset::Dataset;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
@@ -11,9 +13,7 @@ use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink
 use super::pace::Pace;
 use super::saved::Replay;
 use super::settings::Arrival;
-use crate::dataset::Dataset;
 use crate::tracking::{TrackingError, add_gyroscope, held, record, timed, timed_result, tracker_view};
-use crate::trajectory_file::TimedExposure;
 
 /// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
 /// tracked.

@@ -1,5 +1,7 @@
 //! The map while frames come in.
 
+use mba_io::dataset::RgbdFrame;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::SimdLevel;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::trajectory::ExposureTrajectory;
@@ -13,10 +15,8 @@ use crate::bundle::{
     BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed,
     Schedule, log_brightness,
 };
-use crate::dataset::RgbdFrame;
 use crate::exposure::{ExposurePath, motion_of};
 use crate::sensor::{ObservationPyramid, Sensor};
-use crate::trajectory_file::TimedExposure;
 
 /// Resolutions of an observation: full and half.
 pub(super) const LEVELS: usize = 2;

@@ -1,5 +1,7 @@
 //! Places that are seen again: the drift since, and the way back for a tracker that is lost.
 
+use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
+use mba_io::dataset::RgbdFrame;
 use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 
@@ -8,8 +10,6 @@ use super::keyframe_choice::view_change;
 use super::messages::SharpView;
 use super::saved::SavedLoops;
 use super::second_look::{SecondLook, Sighting};
-use crate::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
-use crate::dataset::RgbdFrame;
 use crate::places::{PlaceDescriptor, PlaceIndex};
 use crate::pose_graph::{PoseGraph, PoseGraphEdge, PoseGraphSettings};
 

@@ -2,14 +2,14 @@
 
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use mba_io::dataset::RgbdFrame;
+use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::ReferenceView;
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 
-use crate::dataset::RgbdFrame;
 use crate::run::FrameRecord;
-use crate::trajectory_file::TimedExposure;
 
 /// Frames that wait for the mapper at the most; the tracker waits for a place when there are more.
 const WAITING_FRAMES: usize = 4;

@@ -7,14 +7,14 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
+use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
+use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, save};
+use mba_io::dataset::Dataset;
 use serde::{Deserialize, Serialize};
 
 use super::SlamSettings;
 use super::messages::{Instruction, SharpView};
 use crate::bundle::{BundleState, Keyframe};
-use crate::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
-use crate::checkpoint::{CheckpointError, Fingerprint, Identity, save};
-use crate::dataset::Dataset;
 use crate::mapping::{Running, dataset_fingerprint};
 use crate::run::RunRows;
 

@@ -1,12 +1,12 @@
 //! Aligning a frame with a sharp view outside of the tracking loop: to recognise a place, or to judge a view.
 
+use mba_io::dataset::RgbdFrame;
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{FrameStatus, SimdLevel, Tracker, TrackerConfig};
 
 use super::messages::SharpView;
 use crate::bundle::{FrameState, Keyframe};
-use crate::dataset::RgbdFrame;
 use crate::deblurring::{DeblurMemory, KeyframeDeblurrer};
 use crate::tracking::tracker_view;
 

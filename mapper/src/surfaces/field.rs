@@ -1,10 +1,10 @@
 //! The surface of a signed distance that can be asked for at any point.
 
+use mba_io::mesh::Mesh;
 use rayon::prelude::*;
 
 use super::SurfaceError;
 use super::marching::{Assembly, Lattice, Piece, SampleBox};
-use crate::mesh::Mesh;
 
 /// Layers of cells that are in memory at once, and cells across a box of one task.
 const SLAB: usize = 16;

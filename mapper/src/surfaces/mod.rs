@@ -18,6 +18,7 @@ mod view;
 pub use error::SurfaceError;
 pub use field::{FieldBox, mesh_from_field};
 pub use map_views::MapViews;
+use mba_io::mesh::Mesh;
 pub use of_field::surface_of_field;
 pub use sampling::sample_surface;
 pub use sight::{Sight, Trim};
@@ -25,7 +26,6 @@ pub use tsdf::{FusionSettings, fuse_views};
 pub use view::{DepthView, ViewSource};
 
 use crate::map::Scene;
-use crate::mesh::Mesh;
 
 /// The coloured surface of a map that views of it show, with voxels of `settings.voxel`: a field's is where its distance
 /// is zero, that of Gaussians is fused from the views. Without parts of less than `trim.least_area`.

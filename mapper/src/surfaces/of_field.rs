@@ -1,11 +1,11 @@
 //! The surface of a tri-plane field.
 
+use mba_io::mesh::Mesh;
 use mba_tracker::photometric::InverseResponse;
 use mba_tracker::simd::Level;
 
 use super::field::LIMIT_MB;
 use super::{FieldBox, Sight, SurfaceError, Trim, ViewSource, mesh_from_field};
-use crate::mesh::Mesh;
 use crate::sensor::ForwardResponse;
 use crate::triplane::TriplaneField;
 

@@ -1,12 +1,12 @@
 //! What cameras have seen of a surface: the rest is dropped, and what was seen gets its colour.
 
+use mba_io::mesh::Mesh;
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::components;
 use super::view::{DepthView, SurfaceView};
-use crate::mesh::Mesh;
 use crate::sensor::ForwardResponse;
 
 /// Weight of a colour where the view has no depth to be trusted: it counts where there is no other.

@@ -1,11 +1,11 @@
 //! Numbers of a decoder: features to two hidden layers with ReLU to a few outputs.
 
+use mba_io::checkpoint::exact_floats;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
 use super::planes::signed_unit;
 use super::settings::{FEATURES, HIDDEN};
-use crate::checkpoint::exact_floats;
 
 /// Weights of a decoder, or a number for each of them: a gradient, a moment.
 ///

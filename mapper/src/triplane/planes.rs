@@ -1,12 +1,12 @@
 //! Three axis-aligned planes of features at one resolution.
 
+use mba_io::checkpoint::exact_floats;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
 use super::region::Region;
 use super::settings::{CHANNELS, COARSE_CELL};
-use crate::checkpoint::exact_floats;
 
 /// The two axes of each plane: xy, xz and yz. Nodes next to each other along the first are so in memory.
 pub(super) const PLANE_AXES: [[usize; 2]; 3] = [[0, 1], [0, 2], [1, 2]];

@@ -7,7 +7,7 @@
 mod read;
 mod write;
 
-pub use crate::ply::PlyError;
+pub use mba_io::ply::PlyError;
 pub use read::{parse_ply, read_ply};
 pub use write::{format_ply, write_ply};
 

@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use mba_io::ply::{Element, Header, PlyError, Records};
+use mba_io::whole_file::read;
+
 use super::NAMES;
 use crate::gaussians::display_colour::linear_of;
 use crate::gaussians::store::{COLOUR, Gaussian, Gaussians, OPACITY_LOGIT, PARAMETERS};
-use crate::ply::{Element, Header, PlyError, Records};
-use crate::whole_file::read;
 
 /// What stands for an infinite logit of an opacity: the logistic function of it is 1 in single precision.
 const OPAQUE_LOGIT: f32 = 30.0;
@@ -17,7 +18,7 @@ const OPAQUE_LOGIT: f32 = 30.0;
 ///
 /// If the file cannot be read or is not a file of Gaussians.
 pub fn read_ply(path: &Path) -> Result<Gaussians, PlyError> {
-    parse_ply(path, &read(path, crate::ply::MAGIC)?)
+    parse_ply(path, &read(path, mba_io::ply::MAGIC)?)
 }
 
 /// The Gaussians of a file with the content `bytes`; `path` only names it in errors.

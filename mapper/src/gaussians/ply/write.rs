@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use crate::FileError;
+use mba_io::FileError;
+use mba_io::whole_file::write_together;
+
 use crate::gaussians::display_colour::coefficient_of;
 use crate::gaussians::store::{Gaussian, Gaussians};
-use crate::whole_file::write_together;
 
 /// Properties in the order of the original implementation. Normals are always zero; some viewers insist on them.
 const PROPERTIES: [&str; 17] = [

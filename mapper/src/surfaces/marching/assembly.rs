@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
+use mba_io::mesh::Mesh;
+
 use super::piece::{Crossing, Piece};
-use crate::mesh::Mesh;
 
 /// Where the points of a regular grid are.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,11 +13,11 @@ mod tests;
 pub use settings::FusionSettings;
 
 use blocks::{Blocks, EDGE, Place, add_places};
+use mba_io::mesh::Mesh;
 use rayon::prelude::*;
 
 use super::marching::{Assembly, Lattice, Piece, SampleBox};
 use super::{SurfaceError, ViewSource};
-use crate::mesh::Mesh;
 
 /// The surface that all views agree on, without colours: every view is asked for twice.
 ///

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::{BinaryFileError, FileError};
+use mba_io::{BinaryFileError, FileError};
 
 /// A map file of a field cannot be read.
 #[derive(Debug, thiserror::Error)]

@@ -55,9 +55,9 @@ mod tests {
     use mba_tracker::simd::Level;
 
     use super::*;
-    use crate::BinaryFileError;
     use crate::triplane::TriplaneField;
     use crate::triplane::reference::lively_field;
+    use mba_io::BinaryFileError;
 
     fn written() -> (tempfile::TempDir, PathBuf, TriplaneField) {
         let folder = tempfile::tempdir().unwrap();

@@ -2,15 +2,16 @@
 
 use std::path::Path;
 
+use mba_io::BinaryFileError;
+use mba_io::binary_file::{check_checksum, check_length, check_version};
+use mba_io::whole_file::read;
+
 use super::{CHECKED_FROM, FieldFileError, MAGIC, VERSION};
-use crate::BinaryFileError;
-use crate::binary_file::{check_checksum, check_length, check_version};
 use crate::triplane::field::TriplaneField;
 use crate::triplane::layers::Layers;
 use crate::triplane::planes::FeaturePlanes;
 use crate::triplane::region::{MOST_CELLS, Region};
 use crate::triplane::settings::{CHANNELS, FieldSettings, HIDDEN, MOST_REFINEMENT};
-use crate::whole_file::read;
 
 /// Bytes before the decoders.
 const HEADER_LEN: usize = 76;

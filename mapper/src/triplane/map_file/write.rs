@@ -2,11 +2,12 @@
 
 use std::path::Path;
 
+use mba_io::FileError;
+use mba_io::whole_file::write_durably;
+
 use super::{CHECKED_FROM, MAGIC, VERSION};
-use crate::FileError;
 use crate::triplane::field::TriplaneField;
 use crate::triplane::settings::{CHANNELS, HIDDEN};
-use crate::whole_file::write_durably;
 
 /// Writes `field` as the map file `path`, whole or not at all.
 ///

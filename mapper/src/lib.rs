@@ -17,38 +17,13 @@
 //! [`evaluation`] and [`image_folders`] compare results with the truth, [`statistics`] summarises. [`export`] writes runs
 //! in the formats of other programs.
 
-pub mod bundle;
-pub use mba_io::checkpoint;
-pub mod continuity;
-pub use mba_io::dataset;
-pub mod deblurring;
-pub mod evaluation;
-pub mod export;
-pub mod exposure;
-pub mod gaussians;
-pub mod image_folders;
-pub use mba_io::imu;
-pub mod infill;
-pub mod losses;
-pub mod map;
-pub mod mapping;
-pub use mba_io::mesh;
-pub use mba_io::output;
-pub mod places;
-pub mod pose_graph;
-pub mod raster;
-pub mod rendering;
-pub mod run;
-pub mod self_calibration;
-pub mod sensor;
-pub mod slam;
-pub use mba_io::statistics;
-pub mod surfaces;
+pub use mba_adjust::{bundle, continuity, deblurring, places, pose_graph};
+pub use mba_eval::{evaluation, image_folders};
+pub use mba_field::triplane;
+pub use mba_io::{
+    BinaryFileError, FileError, checkpoint, dataset, imu, mesh, output, statistics, trajectory_file,
+};
+pub use mba_map::{infill, map, rendering, surfaces};
+pub use mba_raster::{exposure, gaussians, losses, raster, sensor};
+pub use mba_slam::{export, mapping, run, self_calibration, slam, tracking};
 pub use mba_synth as synth;
-pub mod tracking;
-pub use mba_io::trajectory_file;
-pub mod triplane;
-mod uncertainty;
-
-pub use mba_io::BinaryFileError;
-pub use mba_io::FileError;

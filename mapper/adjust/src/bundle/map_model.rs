@@ -1,0 +1,75 @@
+//! What the adjustment asks of a map, whatever it consists of.
+
+use mba_field::triplane::TriplaneEngine;
+use mba_map::map::{MapSize, Scene, SceneRenderer};
+use mba_raster::losses::{Exposure, ExposureLoss};
+use mba_raster::sensor::{Observation, Sensor};
+use mba_tracker::geometry::RigidTransform;
+use mba_tracker::simd::Level;
+
+use super::engine::Engine;
+use super::schedule::StepPlan;
+use super::seed_view::SeedView;
+use super::world_moves::WorldMoves;
+
+/// Tables and memory that maps work with. Only the gradients of the last exposure stay, for the step that follows.
+#[derive(Debug)]
+pub(super) struct FitContext {
+    pub(super) level: Level,
+    pub(super) sensor: Sensor,
+    pub(super) engine: Engine,
+    pub(super) field_engine: TriplaneEngine,
+    pub(super) renderer: SceneRenderer,
+}
+
+impl FitContext {
+    pub(super) fn new(level: Level, sensor: Sensor) -> Self {
+        Self {
+            level,
+            engine: Engine::new(level, &sensor),
+            field_engine: TriplaneEngine::new(level, &sensor),
+            renderer: SceneRenderer::new(level),
+            sensor,
+        }
+    }
+}
+
+/// A map that can be fitted to exposures.
+pub(super) trait MapModel {
+    /// The map for a renderer.
+    fn scene(&self) -> Scene<'_>;
+
+    /// Whether nothing was seeded yet.
+    fn is_empty(&self) -> bool;
+
+    /// How large it is.
+    fn size(&self) -> MapSize;
+
+    /// Adds what a keyframe sees and the map does not have, or makes room for it. `most` bounds the Gaussians.
+    fn seed(&mut self, context: &mut FitContext, view: &SeedView<'_>, most: usize);
+
+    /// The loss of an exposure; gradients by the map stay in the context. A map that looks at some pixels only chooses
+    /// them by the number `draw`.
+    fn evaluate(
+        &self,
+        context: &mut FitContext,
+        exposure: Exposure<'_>,
+        plan: &StepPlan,
+        draw: u64,
+    ) -> ExposureLoss;
+
+    /// One step against the gradients in the context.
+    fn step(&mut self, context: &mut FitContext, plan: &StepPlan);
+
+    /// Puts detail where it is missing and removes what is useless.
+    fn change_density(&mut self, most: usize);
+
+    /// Puts neighbours in space next to each other in memory.
+    fn reorder(&mut self);
+
+    /// Moves parts of the map with their keyframes, as far as it has parts.
+    fn move_along(&mut self, moves: &WorldMoves);
+
+    /// Makes room for what a keyframe sees from a new pose.
+    fn make_room(&mut self, seen: &Observation, world_from_camera: &RigidTransform);
+}

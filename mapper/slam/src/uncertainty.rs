@@ -1,0 +1,51 @@
+//! How uncertain poses are relative to the first frame.
+
+use mba_tracker::FrameResult;
+use nalgebra::Vector3;
+
+/// Adds up the uncertainty of each frame relative to its keyframe and that of the keyframe.
+///
+/// A frame is as uncertain relative to its keyframe as the alignment says, times how far picture and depth contradict each
+/// other beyond their noise (the ratio of Birge, as in averages of measurements that do not agree). A keyframe that is turned
+/// wrongly displaces what is far from it.
+#[derive(Clone, Debug, Default)]
+pub struct Uncertainty {
+    frames: Vec<Pose>,
+}
+
+/// Uncertainty of one frame relative to the first.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pose {
+    /// Variance of the position, all axes together, square metres.
+    position: f64,
+    /// Variance of the rotation, all axes together, square radians.
+    rotation: f64,
+    /// World, metres.
+    place: Vector3<f64>,
+}
+
+impl Uncertainty {
+    /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
+    /// relative to the first frame. None where the frame was not aligned.
+    pub fn add(&mut self, result: &FrameResult) -> Option<f64> {
+        let place = result.world_from_mid.translation;
+        let start = Pose { place, ..Pose::default() };
+        let reference = self.frames.get(result.reference_index).copied().unwrap_or(start);
+        let covariance = result.information.try_inverse();
+        let own = covariance.map(|covariance| {
+            let variance = |first: usize| (first..first + 3).map(|i| covariance[(i, i)]).sum::<f64>();
+            [variance(0), variance(3)].map(|variance| variance * result.disagreement.max(1.0))
+        });
+        let [position, rotation] = own.unwrap_or_default();
+        // A small turn moves a point at distance d by d times its share across the line to it: two of three axes.
+        let lever = (place - reference.place).norm_squared() * reference.rotation * 2.0 / 3.0;
+        let pose = Pose {
+            position: reference.position + lever + position,
+            rotation: reference.rotation + rotation,
+            place,
+        };
+        self.frames.push(pose);
+        let is_first = self.frames.len() == 1;
+        (own.is_some() || is_first).then(|| pose.position.sqrt()).filter(|sigma| sigma.is_finite())
+    }
+}

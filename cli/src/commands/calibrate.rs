@@ -10,7 +10,7 @@ use mba_mapper::self_calibration::{self, Finding};
 use serde::Serialize;
 
 use super::open;
-use super::written_run::note_written;
+use crate::written_run::note_written;
 use crate::args::{Calibrate, Switch};
 use crate::console::Console;
 use crate::failure::OrBadInput;

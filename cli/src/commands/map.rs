@@ -8,7 +8,7 @@ use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
 use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
-use super::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
+use crate::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 use super::{calibrate, open};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use super::written_run::refuse;
+use crate::written_run::refuse;
 use crate::args::surface::Mesh;
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, failed, is_disk_full};

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use super::written_run::refuse;
+use crate::written_run::refuse;
 use crate::args::{Render, Switch, ViewNames};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};

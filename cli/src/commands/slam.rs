@@ -10,7 +10,7 @@ use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::tracking::TrackingError;
 use serde_json::json;
 
-use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
+use crate::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
 use super::{calibrate, open, outcome};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;

@@ -5,7 +5,7 @@ use std::path::Path;
 use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset};
 use serde::Serialize;
 
-use super::written_run::{OUT_HINT, refuse};
+use crate::written_run::{OUT_HINT, refuse};
 use crate::args::synth::Synth;
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};

@@ -7,7 +7,7 @@ use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary, write_de
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
-use super::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
+use crate::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
 use super::{calibrate, open, outcome};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;

@@ -14,11 +14,11 @@ use mba_mapper::run::{EXPOSURES_FILE, FRAMES_FILE, Run, SUMMARY_FILE, TRAJECTORY
 use serde::Serialize;
 
 use super::open;
-use crate::written_run::{name, refuse};
 use crate::args::export::{Export, ExportFormat};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
 use crate::report::table::pairs;
+use crate::written_run::{name, refuse};
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

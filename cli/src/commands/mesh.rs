@@ -16,11 +16,11 @@ use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use crate::written_run::refuse;
 use crate::args::surface::Mesh;
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, failed, is_disk_full};
 use crate::report::table::pairs;
+use crate::written_run::refuse;
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

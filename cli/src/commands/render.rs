@@ -13,11 +13,11 @@ use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use crate::written_run::refuse;
 use crate::args::{Render, Switch, ViewNames};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
 use crate::report::table::{pairs, percent};
+use crate::written_run::refuse;
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

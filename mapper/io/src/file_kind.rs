@@ -3,7 +3,7 @@
 use std::fs::FileType;
 
 /// What something in a file system is, in a word.
-pub fn kind_of(file_type: FileType) -> &'static str {
+pub(crate) fn kind_of(file_type: FileType) -> &'static str {
     if file_type.is_dir() {
         return "folder";
     }

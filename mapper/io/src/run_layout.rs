@@ -28,7 +28,7 @@ pub fn deblurred_path(folder: &Path, index: usize) -> PathBuf {
 }
 
 /// Whether a command wrote `folder`: its summary has the form of one, whatever the version.
-pub fn is_run(folder: &Path) -> bool {
+pub(crate) fn is_run(folder: &Path) -> bool {
     let text = read_text(&folder.join(SUMMARY_FILE)).unwrap_or_default();
     let summary: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
     summary["format"].is_u64()

@@ -6,7 +6,7 @@ use crate::FileError;
 use crate::whole_file::read_text;
 
 /// A whole text file; lines that are blank or start with `#` are skipped but counted.
-pub struct TextFile {
+pub(crate) struct TextFile {
     path: PathBuf,
     text: String,
 }
@@ -26,12 +26,12 @@ impl TextFile {
     ///
     /// # Errors
     /// See [`read_text`].
-    pub fn read(path: &Path) -> Result<Self, FileError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
         Ok(Self { path: path.to_owned(), text: read_text(path)? })
     }
 
     /// The lines that say something.
-    pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
+    pub(crate) fn lines(&self) -> impl Iterator<Item = Line<'_>> {
         self.text
             .lines()
             .enumerate()
@@ -90,7 +90,7 @@ impl<'a> Line<'a> {
     }
 
     /// Whether `timestamp`, found on this line, lies after `previous`.
-    pub fn check_order(&self, timestamp: f64, previous: Option<f64>) -> Result<(), FileError> {
+    pub(crate) fn check_order(&self, timestamp: f64, previous: Option<f64>) -> Result<(), FileError> {
         let (path, line) = (self.path.to_owned(), self.number);
         match previous {
             Some(previous) if timestamp < previous => {

@@ -73,12 +73,12 @@ pub struct Recorded<T> {
 }
 
 /// As [`read_trajectory`], but only an unreadable file is an error.
-pub fn read_recorded_trajectory(path: &Path) -> Result<Recorded<TimedPose>, FileError> {
+pub(crate) fn read_recorded_trajectory(path: &Path) -> Result<Recorded<TimedPose>, FileError> {
     sound(path, POSE_LINE, pose_of_line)
 }
 
 /// As [`read_exposures`], but only an unreadable file is an error.
-pub fn read_recorded_exposures(path: &Path) -> Result<Recorded<TimedExposure>, FileError> {
+pub(crate) fn read_recorded_exposures(path: &Path) -> Result<Recorded<TimedExposure>, FileError> {
     sound(path, EXPOSURE_LINE, exposure_of_line)
 }
 

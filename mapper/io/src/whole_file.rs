@@ -44,7 +44,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
 
 /// The content of a file of at most `limit` bytes. What is no file, such as a device or pipe, may have no end and is
 /// not opened.
-pub fn read_at_most(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
+pub(crate) fn read_at_most(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
     let unreadable = |reason| FileError::Unreadable { path: path.to_owned(), reason };
     let mut content = Vec::with_capacity(check_file(path, limit)? as usize);
     // A file may grow while it is read.
@@ -111,17 +111,17 @@ fn place<C: AsRef<[u8]>>(
 }
 
 /// Writes the content of `path` beside it, where it waits for [`put_in_place`] or [`remove_beside`].
-pub fn write_beside(path: &Path, content: &[u8]) -> Result<(), FileError> {
+pub(crate) fn write_beside(path: &Path, content: &[u8]) -> Result<(), FileError> {
     attempt(path, open_partial(path).and_then(|mut file| file.write_all(content)))
 }
 
 /// Gives a file that was written beside `path` that name.
-pub fn put_in_place(path: &Path) -> Result<(), FileError> {
+pub(crate) fn put_in_place(path: &Path) -> Result<(), FileError> {
     attempt(path, fs::rename(partial(path), path))
 }
 
 /// Removes what was written beside `path`; only a left-over remains if this fails.
-pub fn remove_beside(path: &Path) {
+pub(crate) fn remove_beside(path: &Path) {
     let _ = fs::remove_file(partial(path));
 }
 

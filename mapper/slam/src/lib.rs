@@ -6,4 +6,4 @@ pub mod run;
 pub mod self_calibration;
 pub mod slam;
 pub mod tracking;
-pub mod uncertainty;
+mod uncertainty;

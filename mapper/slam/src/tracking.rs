@@ -175,12 +175,12 @@ pub fn timed(timestamp: f64, path: &ExposureTrajectory, world_from_mid: &RigidTr
 }
 
 /// The three poses of a tracked frame.
-pub fn timed_result(result: &FrameResult) -> TimedExposure {
+pub(crate) fn timed_result(result: &FrameResult) -> TimedExposure {
     timed(result.timestamp, &result.world_from_camera, &result.world_from_mid)
 }
 
 /// A frame as the tracker takes it.
-pub fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
+pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
     let (width, height) = (image.width, image.height);
     Ok(Frame {
         timestamp: image.timestamp,
@@ -198,7 +198,7 @@ pub fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
 const GYRO_HALF_WINDOW: f64 = 0.006;
 
 /// Gives a frame what the data set's gyroscope, if there is one, says of the turning around it and since frame `previous`.
-pub fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Option<usize>) {
+pub(crate) fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Option<usize>) {
     let Some(imu) = dataset.imu() else { return };
     let time = frame.timestamp;
     frame.angular_velocity =
@@ -212,7 +212,7 @@ pub fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Option<usiz
 }
 
 /// What is recorded of a frame that took `ms` milliseconds.
-pub fn record(result: &FrameResult, ms: f64) -> FrameRecord {
+pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     FrameRecord {
         timestamp: result.timestamp,
@@ -248,7 +248,7 @@ fn reason(doubt: Doubt) -> Reason {
 }
 
 /// The stand-in for a frame without a result: a camera that stays where it was.
-pub fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
+pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
     let pose = last.map_or_else(RigidTransform::identity, |exposure| exposure.mid);
     let exposure = TimedExposure { timestamp, start: pose, mid: pose, end: pose };
     let record = FrameRecord {

@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 /// other beyond their noise (the ratio of Birge, as in averages of measurements that do not agree). A keyframe that is turned
 /// wrongly displaces what is far from it.
 #[derive(Clone, Debug, Default)]
-pub struct Uncertainty {
+pub(crate) struct Uncertainty {
     frames: Vec<Pose>,
 }
 
@@ -27,7 +27,7 @@ struct Pose {
 impl Uncertainty {
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
     /// relative to the first frame. None where the frame was not aligned.
-    pub fn add(&mut self, result: &FrameResult) -> Option<f64> {
+    pub(crate) fn add(&mut self, result: &FrameResult) -> Option<f64> {
         let place = result.world_from_mid.translation;
         let start = Pose { place, ..Pose::default() };
         let reference = self.frames.get(result.reference_index).copied().unwrap_or(start);

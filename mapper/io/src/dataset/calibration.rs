@@ -145,7 +145,7 @@ const MAX_FOCAL_IN_WIDTHS: f64 = 100.0;
 const MAX_SIDE: usize = 16_384;
 
 /// Most pixels of an image: eight times those of the largest depth cameras.
-pub const MAX_PIXELS: usize = 64_000_000;
+pub(crate) const MAX_PIXELS: usize = 64_000_000;
 
 /// Most raw units of depth per metre: 16 bits then reach to 6 cm.
 const MAX_DEPTH_SCALE: f64 = 1e6;

@@ -42,11 +42,12 @@ use mba_tracker::photometric::InverseResponse;
 
 use crate::FileError;
 pub use crate::trajectory_file::{TimedExposure, TimedPose};
+pub(crate) use calibration::MAX_PIXELS;
 pub use calibration::{
     ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Readout,
     Response, assumed_exposure_seconds,
 };
-pub use calibration::{MAX_PIXELS, check_camera, check_positive};
+pub use calibration::{check_camera, check_positive};
 pub use calibration_text::write_calibration;
 pub use error::{DatasetError, FrameError, Warning};
 pub use exposure_list::{read_exposure_times, write_exposure_times};

@@ -19,5 +19,5 @@
 mod read;
 mod recording;
 
-pub use read::read_folder;
+pub(crate) use read::read_folder;
 pub use recording::{ImuRecording, LONGEST_GAP, TimedVector};

@@ -40,7 +40,7 @@ struct Samples {
 /// # Errors
 ///
 /// [`FileError`] with file and line.
-pub fn read_folder(
+pub(crate) fn read_folder(
     folder: &Path,
     imu_from_camera: Option<&Rotation3<f64>>,
 ) -> Result<Option<ImuRecording>, FileError> {

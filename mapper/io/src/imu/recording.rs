@@ -111,7 +111,7 @@ impl ImuRecording {
     }
 
     /// Whether any of the samples lies within these times, seconds.
-    pub fn overlaps(&self, from: f64, to: f64) -> bool {
+    pub(crate) fn overlaps(&self, from: f64, to: f64) -> bool {
         [&self.angular_velocities, &self.specific_forces].into_iter().any(|samples| {
             match samples.as_slice() {
                 [first, .., last] => first.time <= to && last.time >= from,

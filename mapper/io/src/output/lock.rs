@@ -25,7 +25,7 @@ pub(super) struct Lock {
 }
 
 /// Whether `name` is that of a lock.
-pub fn is_lock(name: &std::ffi::OsStr) -> bool {
+pub(crate) fn is_lock(name: &std::ffi::OsStr) -> bool {
     name == LOCK_FILE
 }
 

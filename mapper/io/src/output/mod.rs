@@ -24,7 +24,7 @@ pub use error::OutputError;
 pub use export::ExportFolder;
 pub use file::OutputFile;
 pub use folder::{OutputFolder, Permission};
-pub use lock::is_lock;
+pub(crate) use lock::is_lock;
 pub use views::ViewFolder;
 
 pub use crate::whole_file::write_text;

@@ -13,7 +13,7 @@ pub enum Encoding {
 
 /// Type of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
+pub(crate) enum Scalar {
     F32,
     F64,
     U8,
@@ -26,14 +26,14 @@ pub enum Scalar {
 
 /// One number, or a list of them with its length in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
+pub(crate) enum Kind {
     Number(Scalar),
     List { length: Scalar, item: Scalar },
 }
 
 /// A named part of a record.
 #[derive(Clone, Debug)]
-pub struct Property {
+pub(crate) struct Property {
     pub name: String,
     pub kind: Kind,
 }
@@ -46,7 +46,7 @@ pub struct Element {
     /// Number of records.
     pub count: u64,
     /// What a record consists of, in this order.
-    pub properties: Vec<Property>,
+    pub(crate) properties: Vec<Property>,
 }
 
 /// What the header says.

@@ -8,7 +8,7 @@ use super::tile::{TILE_HEIGHT, TileGrid};
 
 /// What a view of some rows of tiles gives to an image.
 #[derive(Clone, Copy, Debug)]
-pub struct BandView<'a> {
+pub(crate) struct BandView<'a> {
     /// What its forward pass left.
     pub scratch: &'a RasterScratch,
     /// Its weight in the colour of every row of the image; empty if it has none.
@@ -20,7 +20,7 @@ pub struct BandView<'a> {
 impl Rasterizer {
     /// The weighted sum of the colours of views of an image of `size` columns and rows, with depth and alpha of the
     /// view that has them for each row of tiles.
-    pub fn store_bands(&self, size: [usize; 2], views: &[BandView<'_>], image: &mut RasterImage) {
+    pub(crate) fn store_bands(&self, size: [usize; 2], views: &[BandView<'_>], image: &mut RasterImage) {
         let [width, height] = size;
         image.resize(width, height);
         let grid = TileGrid::new(width, height);

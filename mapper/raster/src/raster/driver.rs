@@ -47,7 +47,7 @@ pub struct RasterScratch {
 
 /// What pieces of Gaussians give to the poses of views, piece by piece.
 #[derive(Debug, Default)]
-pub struct PoseSums(Vec<ViewSums>);
+pub(crate) struct PoseSums(Vec<ViewSums>);
 
 /// Gradients of a loss by Gaussians, summed over views.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -146,7 +146,7 @@ impl Rasterizer {
     }
 
     /// [`Self::render`] for the rows of tiles in `band` only.
-    pub fn render_band(
+    pub(crate) fn render_band(
         &self,
         gaussians: &Gaussians,
         view: &RasterView,
@@ -268,7 +268,7 @@ impl Rasterizer {
     }
 
     /// The mean colour of views of one size, with depth and alpha of the one in the middle.
-    pub fn store_mean(&self, views: &[RasterScratch], image: &mut RasterImage) {
+    pub(crate) fn store_mean(&self, views: &[RasterScratch], image: &mut RasterImage) {
         let Some(grid) = views.first().map(|view| view.bins.grid) else {
             return;
         };
@@ -291,7 +291,12 @@ impl Rasterizer {
     }
 
     /// [`Self::replay`] for an image of which the view has a share.
-    pub fn replay_share(&self, by_image: &RasterImage, share: ViewShare<'_>, scratch: &mut RasterScratch) {
+    pub(crate) fn replay_share(
+        &self,
+        by_image: &RasterImage,
+        share: ViewShare<'_>,
+        scratch: &mut RasterScratch,
+    ) {
         let mut sums = core::mem::take(&mut scratch.sums);
         sums.resize(scratch.bins.entries.len(), [0.0; 12]);
         let input = Replay { by_image, share, scratch };
@@ -336,7 +341,7 @@ impl Rasterizer {
     }
 
     /// [`Self::project_backward`] for views of the same Gaussians, which adds to every gradient view by view.
-    pub fn project_views_backward(
+    pub(crate) fn project_views_backward(
         &self,
         gaussians: &Gaussians,
         views: &[RasterScratch],
@@ -408,7 +413,7 @@ fn slices(gaussians: &Gaussians) -> [&[f32]; PARAMETERS] {
 
 impl PoseSums {
     /// The gradient by the pose of view `view` of `views`: the pieces in their order.
-    pub fn of_view(&self, view: usize, views: usize) -> ViewGradient {
+    pub(crate) fn of_view(&self, view: usize, views: usize) -> ViewGradient {
         let mut total = [0.0; 12];
         for piece in self.0.iter().skip(view).step_by(views.max(1)) {
             total.iter_mut().zip(piece).for_each(|(total, &sum)| *total += f64::from(sum));

@@ -28,10 +28,10 @@ mod tile;
 mod view;
 mod view_share;
 
-pub use bands::BandView;
-pub use driver::PoseSums;
+pub(crate) use bands::BandView;
+pub(crate) use driver::PoseSums;
 pub use driver::{GaussianGradients, RasterScratch, Rasterizer};
 pub use image::RasterImage;
-pub use tile::TILE_HEIGHT;
+pub(crate) use tile::TILE_HEIGHT;
 pub use view::RasterView;
-pub use view_share::{ColourShare, ViewShare};
+pub(crate) use view_share::{ColourShare, ViewShare};

@@ -22,7 +22,7 @@ pub(super) const TILE_COLUMNS: usize = 2;
 pub(super) const TILE_WIDTH: usize = TILE_COLUMNS * BLOCK_WIDTH;
 
 /// Height of a tile in pixels.
-pub const TILE_HEIGHT: usize = 16;
+pub(crate) const TILE_HEIGHT: usize = 16;
 
 /// The tiles of an image or of a band of its rows, row by row; those at the right and bottom border may stick out.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,7 +2,7 @@
 
 /// How the gradient by an image is that by one of the views that it shows.
 #[derive(Clone, Copy, Debug)]
-pub struct ViewShare<'a> {
+pub(crate) struct ViewShare<'a> {
     /// Weight of the view in the colour of the image.
     pub colour: ColourShare<'a>,
     /// Whether depth and alpha of the image are those of the view; else they do not depend on it.
@@ -11,7 +11,7 @@ pub struct ViewShare<'a> {
 
 /// Weight of a view in the colour of an image.
 #[derive(Clone, Copy, Debug)]
-pub enum ColourShare<'a> {
+pub(crate) enum ColourShare<'a> {
     /// The same for all rows.
     Same(f32),
     /// One for every row of the image.

@@ -55,7 +55,7 @@ struct Saving<'a> {
 
 /// What the driver keeps of the steps: seconds for the map so far, and smoothed figures.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Running {
+pub(crate) struct Running {
     pub(super) seconds: f64,
     loss: f64,
     mean_square: f64,
@@ -172,11 +172,11 @@ pub(super) struct Adjustment<'a> {
 
 /// How the state is kept while the loop runs.
 #[derive(Clone, Copy)]
-pub struct Checkpoint<'a> {
+pub(crate) struct Checkpoint<'a> {
     /// Time between two checkpoints.
-    pub interval: Duration,
+    pub(crate) interval: Duration,
     /// Writes one.
-    pub keep: &'a Keep<'a>,
+    pub(crate) keep: &'a Keep<'a>,
 }
 
 /// Writes a checkpoint of a bundle and of what the loop keeps besides.
@@ -251,7 +251,7 @@ fn identity(dataset: &Dataset, run: &Run, settings: &MapSettings) -> Identity {
 }
 
 /// What a data set is, wherever it lies: it may move between two parts of a run.
-pub fn dataset_fingerprint(dataset: &Dataset) -> Fingerprint {
+pub(crate) fn dataset_fingerprint(dataset: &Dataset) -> Fingerprint {
     let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
     Fingerprint::of(&(format!("{:?}", dataset.calibration()), stamps))
 }

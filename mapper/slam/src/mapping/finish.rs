@@ -24,7 +24,7 @@ const STEP_COST: f64 = 3.0;
 const LEAST_STEPS: usize = 60;
 
 /// The refinement of all keyframes together and what follows.
-pub struct Finish<'a> {
+pub(crate) struct Finish<'a> {
     dataset: &'a Dataset,
     settings: &'a MapSettings,
     frames: Frames,
@@ -33,7 +33,7 @@ pub struct Finish<'a> {
 impl<'a> Finish<'a> {
     /// Repairs the exposures of all frames, tells the keyframes what their neighbours suggest, fills what no depth map
     /// showed, and starts the schedule.
-    pub fn new(
+    pub(crate) fn new(
         dataset: &'a Dataset,
         bundle: &mut BundleAdjustment,
         exposures: &[TimedExposure],
@@ -53,7 +53,7 @@ impl<'a> Finish<'a> {
 
     /// Goes on with a refinement that was stopped after it had begun with a schedule of so many steps: the keyframes are
     /// told the same, map and paths are left to the caller.
-    pub fn resume(
+    pub(crate) fn resume(
         dataset: &'a Dataset,
         bundle: &mut BundleAdjustment,
         exposures: &[TimedExposure],
@@ -73,7 +73,7 @@ impl<'a> Finish<'a> {
 
     /// Refines, fits the frames between keyframes, and writes everything. `earlier` is what a part of the refinement
     /// that was stopped had come to, `seconds` the time of the run so far; `more` completes the summary.
-    pub fn run(
+    pub(crate) fn run(
         self,
         mut bundle: BundleAdjustment,
         writer: RunWriter,

@@ -18,10 +18,10 @@ mod prepare;
 mod run_continuity;
 mod settings;
 
-pub use driver::{Checkpoint, Running, dataset_fingerprint};
+pub(crate) use driver::{Checkpoint, Running, dataset_fingerprint};
 pub use driver::{MapProgress, map_dataset};
 pub use error::MapError;
-pub use finish::Finish;
-pub use observations::sensor;
+pub(crate) use finish::Finish;
+pub(crate) use observations::sensor;
 pub use run_continuity::{RepairedRun, repair_run, run_frames};
 pub use settings::MapSettings;

@@ -11,7 +11,7 @@ use mba_raster::sensor::{ObservationPyramid, Sensor};
 const LEVELS: usize = 2;
 
 /// How frames of the data set become observations.
-pub fn sensor(dataset: &Dataset) -> Sensor {
+pub(crate) fn sensor(dataset: &Dataset) -> Sensor {
     let calibration = dataset.calibration();
     Sensor {
         camera: calibration.camera,

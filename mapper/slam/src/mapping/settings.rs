@@ -60,7 +60,7 @@ pub(super) struct Decisive {
 
 impl MapSettings {
     /// Those of the bundle adjustment, for images of that many pixels.
-    pub fn bundle(&self, pixels: usize) -> BundleSettings {
+    pub(crate) fn bundle(&self, pixels: usize) -> BundleSettings {
         let by_size = (pixels / PIXELS_PER_GAUSSIAN).max(2000);
         BundleSettings {
             kind: self.kind,

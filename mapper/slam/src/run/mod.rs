@@ -30,7 +30,7 @@ pub use error::RunError;
 pub use frame_record::{FrameRecord, FrameStatus, Reason};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
-pub use rows::RunRows;
+pub(crate) use rows::RunRows;
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 

@@ -8,7 +8,7 @@ use super::{FrameRecord, RunError, RunWriter};
 
 /// Everything that a [`RunWriter`] was told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct RunRows {
+pub(crate) struct RunRows {
     /// Time and poses at opening, middle and closing of the shutter.
     exposures: Vec<(f64, [PoseNumbers; 3])>,
     frames: Vec<FrameRecord>,
@@ -18,14 +18,14 @@ pub struct RunRows {
 
 impl RunRows {
     /// Number of frames.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.frames.len()
     }
 }
 
 impl RunWriter {
     /// What was recorded so far.
-    pub fn rows(&self) -> RunRows {
+    pub(crate) fn rows(&self) -> RunRows {
         let row = |exposure: &TimedExposure| {
             (exposure.timestamp, [exposure.start, exposure.mid, exposure.end].map(|pose| numbers(&pose)))
         };
@@ -41,7 +41,7 @@ impl RunWriter {
     ///
     /// # Errors
     /// As [`Self::flush`].
-    pub fn restore(&mut self, rows: RunRows) -> Result<(), RunError> {
+    pub(crate) fn restore(&mut self, rows: RunRows) -> Result<(), RunError> {
         let exposure = |(timestamp, poses): (f64, [PoseNumbers; 3])| {
             let [start, mid, end] = poses.map(pose);
             TimedExposure { timestamp, start, mid, end }

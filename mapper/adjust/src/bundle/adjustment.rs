@@ -154,7 +154,7 @@ impl BundleAdjustment {
     }
 
     /// Takes keyframe `k` out; what the map learnt from it stays. Returns `None` if there is no such keyframe.
-    pub fn retire(&mut self, k: usize) -> Option<(Keyframe, FrameState)> {
+    pub fn remove_keyframe(&mut self, k: usize) -> Option<(Keyframe, FrameState)> {
         let both = k < self.keyframes.len().min(self.state.frames.len());
         both.then(|| (self.keyframes.remove(k), self.state.frames.remove(k)))
     }
@@ -167,13 +167,13 @@ impl BundleAdjustment {
     }
 
     /// Starts another schedule at its beginning.
-    pub fn start(&mut self, schedule: Schedule) {
+    pub fn set_schedule(&mut self, schedule: Schedule) {
         self.schedule = schedule;
         (self.state.scheduled_steps, self.state.position) = (0, 0.0);
     }
 
     /// Allows up to so many Gaussians from now on.
-    pub fn allow(&mut self, max_gaussians: usize) {
+    pub fn set_max_gaussians(&mut self, max_gaussians: usize) {
         self.settings.max_gaussians = max_gaussians;
     }
 
@@ -207,7 +207,7 @@ impl BundleAdjustment {
     }
 
     /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
-    pub fn open_share(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
+    pub fn uncovered_fraction(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
         let FitContext { renderer, sensor, .. } = &mut self.context;
         renderer.render(self.state.map.scene(), sensor.camera.at_level(level), world_from_camera);
         let alpha = &renderer.image.alpha;
@@ -225,8 +225,10 @@ impl BundleAdjustment {
         let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
         let views = self.settings.view_count(keyframe, frame, &plan).of_row;
         let gain = frame.log_gain.exp() as f32;
-        let image =
-            self.context.engine.render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
+        let image = self
+            .context
+            .gaussian_loss
+            .render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
         let as_captured = |plane: &Vec<f32>| match &seen.falloff {
             Some(falloff) => {
                 plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()

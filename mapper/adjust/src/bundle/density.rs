@@ -3,7 +3,7 @@
 use mba_raster::gaussians::{Gaussian, Gaussians};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
-use super::ledger::Ledger;
+use super::optimiser_state::OptimiserState;
 
 /// Gaussians fainter than this are removed.
 const FAINT: f32 = 0.02;
@@ -15,9 +15,11 @@ const OFFSET: f32 = 0.7;
 const SHRINK: f32 = 0.6;
 
 /// Divides up to `room` Gaussians that are pulled, those with the largest first. Returns how many.
-pub(super) fn divide(gaussians: &mut Gaussians, ledger: &mut Ledger, room: usize) -> usize {
-    let mut torn: Vec<(f32, usize)> =
-        (0..gaussians.len()).map(|i| (ledger.pull.mean(i), i)).filter(|(mean, _)| *mean > 0.0).collect();
+pub(super) fn divide(gaussians: &mut Gaussians, optimiser: &mut OptimiserState, room: usize) -> usize {
+    let mut torn: Vec<(f32, usize)> = (0..gaussians.len())
+        .map(|i| (optimiser.screen_gradient.mean(i), i))
+        .filter(|(mean, _)| *mean > 0.0)
+        .collect();
     torn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     torn.truncate(room);
     for &(_, i) in &torn {
@@ -25,7 +27,7 @@ pub(super) fn divide(gaussians: &mut Gaussians, ledger: &mut Ledger, room: usize
         let [one, other] = children(&parent);
         gaussians.set(i, &one);
         gaussians.push(&other);
-        ledger.divided(i);
+        optimiser.divided(i);
     }
     torn.len()
 }
@@ -44,7 +46,7 @@ fn children(parent: &Gaussian) -> [Gaussian; 2] {
 }
 
 /// Removes Gaussians that are faint, huge or not finite. Returns how many.
-pub(super) fn prune(gaussians: &mut Gaussians, ledger: &mut Ledger) -> usize {
+pub(super) fn prune(gaussians: &mut Gaussians, optimiser: &mut OptimiserState) -> usize {
     let before = gaussians.len();
     let faint = (FAINT / (1.0 - FAINT)).ln();
     let keep: Vec<usize> = (0..before)
@@ -56,14 +58,14 @@ pub(super) fn prune(gaussians: &mut Gaussians, ledger: &mut Ledger) -> usize {
             })
         })
         .collect();
-    select(gaussians, ledger, &keep);
+    select(gaussians, optimiser, &keep);
     before - keep.len()
 }
 
 /// Makes Gaussian `keep[i]` the new Gaussian i; indices beyond the set are left out.
-pub(super) fn select(gaussians: &mut Gaussians, ledger: &mut Ledger, keep: &[usize]) {
+pub(super) fn select(gaussians: &mut Gaussians, optimiser: &mut OptimiserState, keep: &[usize]) {
     *gaussians = gaussians.select(keep);
-    ledger.select(keep);
+    optimiser.select(keep);
 }
 
 /// Order of the Gaussians along a Z-curve (Morton 1966) through their bounding box, 10 bits per axis: neighbours in
@@ -105,26 +107,26 @@ mod tests {
         Gaussian { mean, log_scale, rotation: [1.0, 0.0, 0.0, 0.0], opacity_logit, colour: [0.5; 3] }
     }
 
-    fn ledger(count: usize) -> Ledger {
-        let mut ledger = Ledger::default();
-        ledger.enrol(count, 0);
-        ledger.moments.updates.fill(3);
-        ledger
+    fn optimiser(count: usize) -> OptimiserState {
+        let mut optimiser = OptimiserState::default();
+        optimiser.append(count, 0);
+        optimiser.moments.updates.fill(3);
+        optimiser
     }
 
     #[test]
     fn the_most_torn_is_divided_along_its_longest_axis() {
         let mut map: Gaussians = [0.0, 1.0, 2.0].map(|x| gaussian([x, 0.0, 0.0], 1.0)).into_iter().collect();
-        let mut ledger = ledger(3);
+        let mut optimiser = optimiser(3);
         // The second is pulled less in all, but only seen once.
-        ledger.pull.add(&[1.0, 1.8, 0.5], &[true, true, true]);
-        ledger.pull.add(&[1.0, 9.0, 0.5], &[true, false, true]);
-        assert_eq!(divide(&mut map, &mut ledger, 1), 1);
-        assert_eq!((map.len(), ledger.moments.updates.len()), (4, 4));
+        optimiser.screen_gradient.add(&[1.0, 1.8, 0.5], &[true, true, true]);
+        optimiser.screen_gradient.add(&[1.0, 9.0, 0.5], &[true, false, true]);
+        assert_eq!(divide(&mut map, &mut optimiser, 1), 1);
+        assert_eq!((map.len(), optimiser.moments.updates.len()), (4, 4));
         let [one, other] = [1, 3].map(|i| map.get(i).unwrap());
         assert!((one.mean[1] + 0.07).abs() < 1e-6 && (other.mean[1] - 0.07).abs() < 1e-6);
         assert!((one.log_scale[1].exp() - 0.06).abs() < 1e-6 && one.log_scale[0] == 0.01_f32.ln());
-        assert_eq!((ledger.moments.updates[0], ledger.moments.updates[1]), (3, 0));
+        assert_eq!((optimiser.moments.updates[0], optimiser.moments.updates[1]), (3, 0));
     }
 
     #[test]
@@ -135,9 +137,9 @@ mod tests {
         broken.colour[1] = f32::NAN;
         let mut map: Gaussians =
             [huge, gaussian([7.0; 3], 0.0), gaussian([0.0; 3], -5.0), broken].into_iter().collect();
-        let mut ledger = ledger(4);
-        assert_eq!(prune(&mut map, &mut ledger), 3);
-        assert_eq!((map.get(0).unwrap().mean, ledger.moments.updates.len()), ([7.0; 3], 1));
+        let mut optimiser = optimiser(4);
+        assert_eq!(prune(&mut map, &mut optimiser), 3);
+        assert_eq!((map.get(0).unwrap().mean, optimiser.moments.updates.len()), ([7.0; 3], 1));
     }
 
     #[test]

@@ -84,12 +84,12 @@ impl MapModel for FieldMap {
             seed: self.seed,
             step: draw,
         };
-        context.field_engine.evaluate(&self.field, &given)
+        context.field_loss.evaluate(&self.field, &given)
     }
 
     fn step(&mut self, context: &mut FitContext, plan: &StepPlan) {
         let step = FieldStep::default().scaled(plan.shrink);
-        self.adam.step(context.level, &mut self.field, context.field_engine.gradients(), step);
+        self.adam.step(context.level, &mut self.field, context.field_loss.gradients(), step);
     }
 
     /// The planes are as dense everywhere.

@@ -7,8 +7,8 @@ use mba_raster::sensor::Observation;
 use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
-use super::ledger::Ledger;
 use super::map_model::{FitContext, MapModel};
+use super::optimiser_state::OptimiserState;
 use super::schedule::StepPlan;
 use super::seed_view::SeedView;
 use super::world_moves::{WorldMoves, move_gaussians};
@@ -22,7 +22,7 @@ const GROWTH: f64 = 0.15;
 pub struct GaussianMap {
     /// The map.
     pub gaussians: Gaussians,
-    ledger: Ledger,
+    optimiser: OptimiserState,
 }
 
 impl MapModel for GaussianMap {
@@ -44,7 +44,7 @@ impl MapModel for GaussianMap {
         let (alpha, response) = (&context.renderer.image.alpha, &context.sensor.inverse_response);
         let room = most.saturating_sub(self.gaussians.len());
         seeding::seed(&mut self.gaussians, view, response, alpha, room);
-        self.ledger.enrol(self.gaussians.len(), *index);
+        self.optimiser.append(self.gaussians.len(), *index);
     }
 
     fn evaluate(
@@ -54,34 +54,34 @@ impl MapModel for GaussianMap {
         plan: &StepPlan,
         _draw: u64,
     ) -> ExposureLoss {
-        context.engine.evaluate(&self.gaussians, exposure, plan)
+        context.gaussian_loss.evaluate(&self.gaussians, exposure, plan)
     }
 
     fn step(&mut self, context: &mut FitContext, plan: &StepPlan) {
-        let (gradients, drawn) = (context.engine.gradients(), context.engine.drawn());
-        let Self { gaussians, ledger } = self;
-        adam::step(gaussians, &gradients.parameters, drawn, &plan.lengths, &mut ledger.moments);
-        ledger.pull.add(&gradients.screen, drawn);
+        let (gradients, drawn) = (context.gaussian_loss.gradients(), context.gaussian_loss.drawn());
+        let Self { gaussians, optimiser } = self;
+        adam::step(gaussians, &gradients.parameters, drawn, &plan.lengths, &mut optimiser.moments);
+        optimiser.screen_gradient.add(&gradients.screen, drawn);
     }
 
     /// Divides Gaussians that are torn between pixels, removes useless ones, and puts the others in order.
     fn change_density(&mut self, most: usize) {
-        let Self { gaussians, ledger } = self;
+        let Self { gaussians, optimiser } = self;
         let count = gaussians.len();
         let room = most.saturating_sub(count).min((GROWTH * count as f64) as usize);
-        density::divide(gaussians, ledger, room);
-        density::prune(gaussians, ledger);
+        density::divide(gaussians, optimiser, room);
+        density::prune(gaussians, optimiser);
         self.reorder();
     }
 
     fn reorder(&mut self) {
         let order = density::morton_order(&self.gaussians);
-        density::select(&mut self.gaussians, &mut self.ledger, &order);
+        density::select(&mut self.gaussians, &mut self.optimiser, &order);
     }
 
     /// Every Gaussian moves with the keyframe that it was seeded from, or with the next one in time if that was given up.
     fn move_along(&mut self, moves: &WorldMoves) {
-        move_gaussians(&mut self.gaussians, &self.ledger.origins, moves);
+        move_gaussians(&mut self.gaussians, &self.optimiser.origins, moves);
     }
 
     /// There are no bounds.

@@ -1,13 +1,13 @@
 //! What the adjustment asks of a map, whatever it consists of.
 
-use mba_field::triplane::TriplaneEngine;
+use mba_field::triplane::FieldLoss;
 use mba_map::map::{MapSize, Scene, SceneRenderer};
 use mba_raster::losses::{Exposure, ExposureLoss};
 use mba_raster::sensor::{Observation, Sensor};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
 
-use super::engine::Engine;
+use super::gaussian_loss::GaussianLoss;
 use super::schedule::StepPlan;
 use super::seed_view::SeedView;
 use super::world_moves::WorldMoves;
@@ -17,8 +17,8 @@ use super::world_moves::WorldMoves;
 pub(super) struct FitContext {
     pub(super) level: Level,
     pub(super) sensor: Sensor,
-    pub(super) engine: Engine,
-    pub(super) field_engine: TriplaneEngine,
+    pub(super) gaussian_loss: GaussianLoss,
+    pub(super) field_loss: FieldLoss,
     pub(super) renderer: SceneRenderer,
 }
 
@@ -26,8 +26,8 @@ impl FitContext {
     pub(super) fn new(level: Level, sensor: Sensor) -> Self {
         Self {
             level,
-            engine: Engine::new(level, &sensor),
-            field_engine: TriplaneEngine::new(level, &sensor),
+            gaussian_loss: GaussianLoss::new(level, &sensor),
+            field_loss: FieldLoss::new(level, &sensor),
             renderer: SceneRenderer::new(level),
             sensor,
         }

@@ -5,7 +5,7 @@
 //! colour of it. A ray adds up its samples with weights that follow from the distances, and a blurred pixel is the mean
 //! in linear light of its rays in all virtual views.
 //!
-//! [`TriplaneEngine`] compares some pixels of an exposure with what was captured and takes the gradient back to planes,
+//! [`FieldLoss`] compares some pixels of an exposure with what was captured and takes the gradient back to planes,
 //! decoders, sharpness, gain and the path of the camera. Rays are sampled where a surface is expected: around the
 //! measured depth at mid exposure, around where that surface lies in the other virtual views, and around what the field
 //! itself has where nothing was measured. [`TriplaneAdam`] moves what was seen. [`FieldRenderer`] makes views,
@@ -17,8 +17,8 @@ mod chunk;
 mod decode;
 mod decode_backward;
 mod encode;
-mod engine;
 mod field;
+mod field_loss;
 mod gradients;
 mod layers;
 mod map_file;
@@ -39,8 +39,8 @@ mod settings;
 mod weights;
 
 pub use adam::{FieldStep, TriplaneAdam};
-pub use engine::{FieldExposure, TriplaneEngine};
 pub use field::TriplaneField;
+pub use field_loss::{FieldExposure, FieldLoss};
 pub use gradients::FieldGradients;
 pub use map_file::{FieldFileError, read_field, write_field};
 pub use region::Region;

@@ -149,8 +149,8 @@ mod tests {
     use super::*;
     use crate::surfaces::MapViews;
     use mba_field::triplane::{
-        FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
-        TriplaneEngine,
+        FieldExposure, FieldLoss, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings,
+        TriplaneAdam,
     };
     use mba_raster::exposure::{ExposurePath, RowTimes, RowTiming};
     use mba_raster::losses::Exposure;
@@ -188,7 +188,7 @@ mod tests {
         let path = ExposurePath::linear(ExposureTrajectory { start: still, end: still });
         let region = Region::around([-0.6, -0.5, 0.0], [0.6, 0.5, 1.1]);
         let mut field = TriplaneField::new(region, FieldSettings::default(), 1);
-        let mut engine = TriplaneEngine::new(Level::new(), &sensor);
+        let mut field_loss = FieldLoss::new(Level::new(), &sensor);
         let mut adam = TriplaneAdam::default();
         for step in 0..400 {
             let given = FieldExposure {
@@ -200,8 +200,8 @@ mod tests {
                 seed: 1,
                 step,
             };
-            engine.evaluate(&field, &given);
-            adam.step(Level::new(), &mut field, engine.gradients(), FieldStep::default());
+            field_loss.evaluate(&field, &given);
+            adam.step(Level::new(), &mut field, field_loss.gradients(), FieldStep::default());
         }
         field
     });

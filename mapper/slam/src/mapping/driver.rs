@@ -10,9 +10,9 @@ use mba_io::output::OutputFolder;
 use mba_map::map::MapSize;
 use serde::{Deserialize, Serialize};
 
-use super::between::{Fit, all_exposures};
+use super::other_frames::{Fit, all_exposures};
 use super::prepare::{self, Frames};
-use super::{MapError, MapSettings, merit, output};
+use super::{MapError, MapSettings, output, picture_figures};
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
 
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.
@@ -147,7 +147,7 @@ impl Conclusion<'_> {
             peak_memory_bytes: output::peak_memory_bytes(),
             loss: running.loss,
             keyframes: bundle.keyframes().len(),
-            ..merit::image_figures(dataset, &bundle, writer.folder(), &exposures)
+            ..picture_figures::image_figures(dataset, &bundle, writer.folder(), &exposures)
         };
         let merit = Merit::of(&exposures, dataset);
         let summary = writer.finish(|summary| {

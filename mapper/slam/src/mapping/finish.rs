@@ -8,8 +8,8 @@ use mba_io::dataset::Dataset;
 use mba_io::trajectory_file::TimedExposure;
 use mba_map::map::MapKind;
 
-use super::between::Fit;
 use super::driver::{Adjustment, BUDGET_RESERVE, Checkpoint, Conclusion, Running};
+use super::other_frames::Fit;
 use super::prepare::Frames;
 use super::{MapError, MapProgress, MapSettings};
 use crate::run::{FrameRecord, RunWriter, Summary};
@@ -47,7 +47,7 @@ impl<'a> Finish<'a> {
             bundle.seed_from(k, DepthSource::Completed);
         }
         bundle.change_density();
-        bundle.start(schedule(bundle));
+        bundle.set_schedule(schedule(bundle));
         Ok(Self { dataset, settings, frames })
     }
 
@@ -64,7 +64,7 @@ impl<'a> Finish<'a> {
         for k in 0..bundle.keyframes().len() {
             bundle.set_prior(k, frames.priors[bundle.keyframes()[k].index]);
         }
-        bundle.start(match settings.kind {
+        bundle.set_schedule(match settings.kind {
             MapKind::Gaussians => Schedule::finish(schedule_steps),
             MapKind::Field => Schedule::field(bundle.keyframes().len()),
         });

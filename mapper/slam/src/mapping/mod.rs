@@ -5,15 +5,15 @@
 //! `resume` it ends with the same files, bit for bit, as one that was never stopped. Only a time budget makes results
 //! depend on how fast the machine is.
 
-mod between;
 mod choice;
 mod driver;
 mod error;
 mod evidence;
 mod finish;
-mod merit;
 mod observations;
+mod other_frames;
 mod output;
+mod picture_figures;
 mod prepare;
 mod run_continuity;
 mod settings;

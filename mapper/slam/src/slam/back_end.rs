@@ -234,7 +234,7 @@ impl BackEnd {
     ) -> Instruction {
         let mut world_move = None;
         let mut pose = exposure.mid;
-        if self.map.take(&exposure, blur_px, image) {
+        if self.map.insert_frame(&exposure, blur_px, image) {
             self.loops.remember(&self.map, image);
             if self.settings.loops {
                 world_move = self.close_loop(image);
@@ -278,12 +278,14 @@ impl BackEnd {
 
     /// Whether the map explains a frame better than the nearest keyframe does, and that keyframe as a view.
     fn judge(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> (bool, Option<SharpView>) {
-        let look = self.loops.look();
+        let relocaliser = self.loops.relocaliser();
         let Some(keyframe) = self.map.nearest_other(pose, image.index) else { return (false, None) };
         let bundle = &self.map.bundle;
         let (known, state) = (&bundle.keyframes()[keyframe], &bundle.state.frames[keyframe]);
-        let keyframe_view = look.keyframe_view(known, state, self.map.sensor.depth_scale);
-        let mut residual = |view: &SharpView| look.align(image, view, pose).map(|sighting| sighting.residual);
+        let keyframe_view = relocaliser.keyframe_view(known, state, self.map.sensor.depth_scale);
+        let mut residual = |view: &SharpView| {
+            relocaliser.align_to(image, view, pose).map(|measurement| measurement.residual)
+        };
         let on_keyframe = residual(&keyframe_view);
         let on_map = self.map.sharp_view(pose).and_then(|view| residual(&view));
         let is_better = match (on_map, on_keyframe) {

@@ -139,7 +139,7 @@ impl SlamRun<'_> {
         let settings = self.settings.mapping().bundle(pixels);
         let frames = state.frames.clone();
         let mut bundle = BundleAdjustment::new(SimdLevel::new(), sensor, settings, keyframes, frames);
-        bundle.allow(parts.max_gaussians);
+        bundle.set_max_gaussians(parts.max_gaussians);
         writer.restore(parts.rows)?;
         let Counts { frames_on_map, late_frames, relocalisations } = parts.counts;
         let figures = SlamFigures {

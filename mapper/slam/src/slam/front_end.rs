@@ -9,8 +9,8 @@ use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
 
+use super::arrival_clock::Pace;
 use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink};
-use super::pace::Pace;
 use super::saved::Replay;
 use super::settings::Arrival;
 use crate::tracking::{TrackingError, add_gyroscope, held, record, timed, timed_result, tracker_view};

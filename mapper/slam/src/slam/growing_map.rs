@@ -79,7 +79,7 @@ impl GrowingMap {
             map.bundle.push(keyframe, frame.clone());
         }
         map.bundle.state = state;
-        map.bundle.allow(max_gaussians);
+        map.bundle.set_max_gaussians(max_gaussians);
         // Every second step draws a number.
         map.random.advance(growth.steps as u64 / 2);
         let Growth { effort, steps, seen, retired } = growth;
@@ -97,12 +97,12 @@ impl GrowingMap {
     }
 
     /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.
-    pub(super) fn take(&mut self, exposure: &TimedExposure, blur_px: f64, image: &RgbdFrame) -> bool {
+    pub(super) fn insert_frame(&mut self, exposure: &TimedExposure, blur_px: f64, image: &RgbdFrame) -> bool {
         let camera = self.sensor.camera;
         let near = neighbours(&self.bundle, &exposure.mid, &camera);
         let blur_px = if blur_px.is_finite() { blur_px } else { 0.0 };
         let wanted = is_worth_it(&self.bundle, near.first(), blur_px, camera.width)
-            || self.bundle.open_share(&exposure.mid, COARSE) > NEW_AREA;
+            || self.bundle.uncovered_fraction(&exposure.mid, COARSE) > NEW_AREA;
         if !wanted {
             return false;
         }
@@ -117,7 +117,7 @@ impl GrowingMap {
         if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
             && let Some(k) = most_dispensable(&self.bundle, &camera)
         {
-            self.bundle.retire(k);
+            self.bundle.remove_keyframe(k);
             self.retired += 1;
         }
         true
@@ -165,9 +165,9 @@ impl GrowingMap {
         let pixels = (self.sensor.camera.width * self.sensor.camera.height) as f64;
         let most = self.settings.max_gaussians.unwrap_or(usize::MAX);
         let pose = self.bundle.state.frames[newest].path.mid();
-        self.seen += if newest == 0 { 1.0 } else { self.bundle.open_share(&pose, COARSE) };
+        self.seen += if newest == 0 { 1.0 } else { self.bundle.uncovered_fraction(&pose, COARSE) };
         let by_area = (self.seen * pixels) as usize / PIXELS_PER_GAUSSIAN;
-        self.bundle.allow(by_area.max(2000).min(most));
+        self.bundle.set_max_gaussians(by_area.max(2000).min(most));
         self.bundle.seed_from(newest, DepthSource::Measured);
     }
 

@@ -10,8 +10,8 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use super::growing_map::GrowingMap;
 use super::keyframe_choice::view_change;
 use super::messages::SharpView;
+use super::relocaliser::{PoseMeasurement, Relocaliser};
 use super::saved::SavedLoops;
-use super::second_look::{SecondLook, Sighting};
 
 /// Keyframes before the newest that are no place seen *again*.
 const RECENT: usize = 12;
@@ -30,12 +30,12 @@ const PAUSE: usize = 6;
 /// of the motion.
 const ODOMETRY: (f64, f64, f64) = (2e-3, 1e-3, 0.02);
 
-/// Standard deviation of a sighting, metres and radians.
+/// Standard deviation of a measurement, metres and radians.
 const SIGHTING: (f64, f64) = (2e-3, 1e-3);
 
 /// What is known of places, and the loops that were closed.
 pub(super) struct Loops {
-    look: SecondLook,
+    relocaliser: Relocaliser,
     places: PlaceIndex,
     closed: Vec<Closure>,
     pause: usize,
@@ -51,7 +51,12 @@ struct Closure {
 
 impl Loops {
     pub(super) fn new(config: &TrackerConfig) -> Self {
-        Self { look: SecondLook::new(config), places: PlaceIndex::default(), closed: Vec::new(), pause: 0 }
+        Self {
+            relocaliser: Relocaliser::new(config),
+            places: PlaceIndex::default(),
+            closed: Vec::new(),
+            pause: 0,
+        }
     }
 
     /// What was known of places and loops when a run was stopped; `keyframes` are the images of the keyframes.
@@ -77,8 +82,8 @@ impl Loops {
     }
 
     /// For questions about views.
-    pub(super) fn look(&mut self) -> &mut SecondLook {
-        &mut self.look
+    pub(super) fn relocaliser(&mut self) -> &mut Relocaliser {
+        &mut self.relocaliser
     }
 
     /// Loops that were closed.
@@ -97,8 +102,8 @@ impl Loops {
 
     /// Where a lost frame is: the view of the keyframe it was recognised in, to start from.
     pub(super) fn find(&mut self, map: &GrowingMap, image: &RgbdFrame) -> Option<SharpView> {
-        let (_, view, sighting) = self.recognise(map, image, |_| true)?;
-        Some(SharpView { start_from: Some(sighting.world_from_camera), ..view })
+        let (_, view, measurement) = self.recognise(map, image, |_| true)?;
+        Some(SharpView { start_from: Some(measurement.world_from_camera), ..view })
     }
 
     /// Looks for an older place in the newest keyframe, whose frame is given. If the map says otherwise where that is,
@@ -111,15 +116,15 @@ impl Loops {
         let keyframes = map.bundle.keyframes();
         let newest = keyframes.len().checked_sub(1)?;
         let old: Vec<usize> = keyframes[..newest.saturating_sub(RECENT)].iter().map(|k| k.index).collect();
-        let (before, view, sighting) = self.recognise(map, image, |id| old.contains(&id))?;
+        let (before, view, measurement) = self.recognise(map, image, |id| old.contains(&id))?;
         let now = map.bundle.state.frames[newest].path.mid();
         let depth = keyframes[newest].depth;
         let camera = &map.sensor.camera;
-        if view_change(&sighting.world_from_camera, &now, camera, depth) < DRIFT * camera.width as f64 {
+        if view_change(&measurement.world_from_camera, &now, camera, depth) < DRIFT * camera.width as f64 {
             self.pause = PAUSE;
             return None;
         }
-        let before_from_now = view.world_from_camera.inverse().compose(&sighting.world_from_camera);
+        let before_from_now = view.world_from_camera.inverse().compose(&measurement.world_from_camera);
         self.closed.push(Closure { before, now: image.index, before_from_now });
         let mut graph = self.graph(map);
         let report = graph.optimise(&PoseGraphSettings::default()).ok()?;
@@ -137,17 +142,17 @@ impl Loops {
         map: &GrowingMap,
         image: &RgbdFrame,
         is_eligible: impl Fn(usize) -> bool,
-    ) -> Option<(usize, SharpView, Sighting)> {
+    ) -> Option<(usize, SharpView, PoseMeasurement)> {
         let descriptor = PlaceDescriptor::new(&image.rgb, &map.sensor.camera).ok()?;
         let candidates = self.places.candidates(&descriptor, MOST_CANDIDATES, MIN_SIMILARITY, is_eligible);
         candidates.into_iter().find_map(|candidate| {
             let keyframes = map.bundle.keyframes();
             let k = keyframes.iter().position(|keyframe| keyframe.index == candidate.id)?;
             let state = &map.bundle.state.frames[k];
-            let view = self.look.keyframe_view(&keyframes[k], state, map.sensor.depth_scale);
+            let view = self.relocaliser.keyframe_view(&keyframes[k], state, map.sensor.depth_scale);
             let guess = view.world_from_camera.compose(&candidate.stored_from_query);
-            let sighting = self.look.align(image, &view, &guess)?;
-            Some((candidate.id, view, sighting))
+            let measurement = self.relocaliser.align_to(image, &view, &guess)?;
+            Some((candidate.id, view, measurement))
         })
     }
 

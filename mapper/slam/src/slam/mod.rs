@@ -11,6 +11,7 @@
 //!
 //! After the last frame all of the map is refined together with all paths, as [`crate::mapping`] does.
 
+mod arrival_clock;
 mod back_end;
 mod driver;
 mod error;
@@ -19,10 +20,9 @@ mod growing_map;
 mod keyframe_choice;
 mod loops;
 mod messages;
-mod pace;
 mod progress;
+mod relocaliser;
 mod saved;
-mod second_look;
 mod settings;
 mod sharp_view;
 

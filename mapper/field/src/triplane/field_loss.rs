@@ -38,15 +38,15 @@ pub struct FieldExposure<'a> {
 /// Renders pixels of exposures, compares them with what was captured, and takes gradients back. Memory is kept from
 /// exposure to exposure.
 #[derive(Debug)]
-pub struct TriplaneEngine {
+pub struct FieldLoss {
     level: Level,
     curve: DisplayCurve,
     chunks: Vec<Chunk>,
     gradients: FieldGradients,
 }
 
-impl TriplaneEngine {
-    /// An engine with the instruction set `level`; levels differ by rounding only.
+impl FieldLoss {
+    /// Memory for it, with the instruction set `level`; levels differ by rounding only.
     #[must_use]
     pub fn new(level: Level, sensor: &Sensor) -> Self {
         Self {
@@ -219,9 +219,9 @@ mod tests {
         views: usize,
     ) -> (ExposureLoss, FieldGradients) {
         let seen = observation();
-        let mut engine = TriplaneEngine::new(level, &sensor());
-        let loss = engine.evaluate(field, &drawn(Exposure { seen: &seen, path, gain, views }));
-        (loss, engine.gradients().clone())
+        let mut field_loss = FieldLoss::new(level, &sensor());
+        let loss = field_loss.evaluate(field, &drawn(Exposure { seen: &seen, path, gain, views }));
+        (loss, field_loss.gradients().clone())
     }
 
     /// Groups of parameters of a field, to be changed along a gradient.
@@ -331,10 +331,10 @@ mod tests {
         let times = RowTimes { exposure: 0.4, readout: 0.6, depth_offset: 0.3, depth_readout: 0.0 };
         let falloff: Vec<f32> = (0..SIZE[0] * SIZE[1]).map(|pixel| 1.0 - 0.001 * pixel as f32).collect();
         let seen = Observation { times, falloff: Some(falloff.into()), ..observation() };
-        let mut engine = TriplaneEngine::new(Level::new(), &sensor());
+        let mut field_loss = FieldLoss::new(Level::new(), &sensor());
         let exposure = Exposure { seen: &seen, path, gain: 1.1, views: 3 };
         let given = FieldExposure { with_path, ..drawn(exposure) };
-        engine.evaluate(&lively_field(), &given)
+        field_loss.evaluate(&lively_field(), &given)
     }
 
     #[test]
@@ -391,7 +391,7 @@ mod tests {
         let mut seen = observation();
         seen.region.right = 0;
         let exposure = Exposure { seen: &seen, path: &path(), gain: 1.0, views: 3 };
-        let loss = TriplaneEngine::new(Level::new(), &sensor()).evaluate(&lively_field(), &drawn(exposure));
+        let loss = FieldLoss::new(Level::new(), &sensor()).evaluate(&lively_field(), &drawn(exposure));
         assert_eq!((loss.terms.total(), loss.by_log_gain), (0.0, 0.0));
     }
 }

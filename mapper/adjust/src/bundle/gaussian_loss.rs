@@ -12,7 +12,7 @@ use super::schedule::StepPlan;
 /// Renders exposures, compares them with what was captured, and takes gradients back. Memory is kept from exposure to
 /// exposure.
 #[derive(Debug)]
-pub struct Engine {
+pub struct GaussianLoss {
     curve: DisplayCurve,
     renderer: ExposureRenderer,
     scratch: ExposureScratch,
@@ -23,8 +23,8 @@ pub struct Engine {
     gradients: GaussianGradients,
 }
 
-impl Engine {
-    /// An engine with the instruction set `level`; levels differ by rounding only.
+impl GaussianLoss {
+    /// Memory for it, with the instruction set `level`; levels differ by rounding only.
     #[must_use]
     pub fn new(level: Level, sensor: &Sensor) -> Self {
         Self {

@@ -14,7 +14,7 @@ use crate::tracking::tracker_view;
 const MIN_INLIERS: f32 = 0.35;
 
 /// A tracker of its own, which starts anew for every question.
-pub(super) struct SecondLook {
+pub(super) struct Relocaliser {
     config: TrackerConfig,
     memory: Vec<u8>,
     deblurrer: KeyframeDeblurrer,
@@ -23,14 +23,14 @@ pub(super) struct SecondLook {
 
 /// Where a frame was seen from, according to one view.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sighting {
+pub(super) struct PoseMeasurement {
     /// `world_from_camera` at mid exposure, in the world of the view's pose.
     pub(super) world_from_camera: RigidTransform,
     /// Robust photometric residual, standard deviations of the nominal noise.
     pub(super) residual: f32,
 }
 
-impl SecondLook {
+impl Relocaliser {
     pub(super) fn new(config: &TrackerConfig) -> Self {
         let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
         let deblur_memory = deblurrer.memory();
@@ -41,20 +41,22 @@ impl SecondLook {
     }
 
     /// Aligns a frame with a view, from a guess of the frame's pose; `None` if they do not fit.
-    pub(super) fn align(
+    pub(super) fn align_to(
         &mut self,
         image: &RgbdFrame,
         view: &SharpView,
         world_from_camera: &RigidTransform,
-    ) -> Option<Sighting> {
+    ) -> Option<PoseMeasurement> {
         let mut tracker = Tracker::new(&self.config, SimdLevel::new(), &mut self.memory).ok()?;
         let align = || -> Result<_, TrackError> {
             tracker.relocate(&view.reference(&self.config.camera)?, world_from_camera)?;
             tracker.track(&tracker_view(image)?)
         };
         let result = { align }().ok()?;
-        (result.status == FrameStatus::Ok && result.inliers > MIN_INLIERS)
-            .then_some(Sighting { world_from_camera: result.world_from_mid, residual: result.residual })
+        (result.status == FrameStatus::Ok && result.inliers > MIN_INLIERS).then_some(PoseMeasurement {
+            world_from_camera: result.world_from_mid,
+            residual: result.residual,
+        })
     }
 
     /// A keyframe as a sharp view: deblurred with its own motion.

@@ -8,18 +8,18 @@ use super::adam::Moments;
 
 /// One entry per Gaussian of the map, in the map's order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Ledger {
+pub(super) struct OptimiserState {
     /// Moments of the gradients.
     pub(super) moments: Moments,
-    /// Pulls since the last change of density.
-    pub(super) pull: Pull,
+    /// Screen gradients since the last change of density.
+    pub(super) screen_gradient: ScreenGradient,
     /// The keyframe that each was seeded from, by its index in the data set. Children have their parent's.
     pub(super) origins: Vec<u32>,
 }
 
-/// How strongly the views pull at every Gaussian, since the last change of density.
+/// Mean length of the gradient by the projected centre of every Gaussian, since the last change of density.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Pull {
+pub(super) struct ScreenGradient {
     /// Sum of lengths of gradients by the projected centre.
     #[serde(with = "exact_floats")]
     sum: Vec<f32>,
@@ -27,8 +27,8 @@ pub(super) struct Pull {
     drawn: Vec<u32>,
 }
 
-impl Pull {
-    /// Adds the pulls of an exposure.
+impl ScreenGradient {
+    /// Adds those of an exposure.
     pub(super) fn add(&mut self, screen: &[f32], is_drawn: &[bool]) {
         let own = self.sum.iter_mut().zip(&mut self.drawn);
         for ((sum, drawn), (screen, _)) in own.zip(screen.iter().zip(is_drawn)).filter(|(_, (_, is))| **is) {
@@ -48,13 +48,13 @@ impl Pull {
     }
 }
 
-impl Ledger {
+impl OptimiserState {
     /// Entries for new Gaussians at the end of a map that now has `count`, seeded from keyframe `origin`.
-    pub(super) fn enrol(&mut self, count: usize, origin: usize) {
+    pub(super) fn append(&mut self, count: usize, origin: usize) {
         self.moments.first.resize(count);
         self.moments.second.resize(count);
         self.moments.updates.resize(count, 0);
-        self.pull.resize(count);
+        self.screen_gradient.resize(count);
         self.origins.resize(count, u32::try_from(origin).unwrap_or(u32::MAX));
     }
 
@@ -64,7 +64,7 @@ impl Ledger {
         self.moments.second.set(i, &Gaussian::default());
         self.moments.updates[i] = 0;
         let origin = self.origins[i];
-        self.enrol(self.origins.len() + 1, origin as usize);
+        self.append(self.origins.len() + 1, origin as usize);
     }
 
     /// Makes entry `keep[i]` the new entry i; indices beyond the end are left out. The pulls start anew.
@@ -73,8 +73,8 @@ impl Ledger {
         self.moments.second = self.moments.second.select(keep);
         self.moments.updates = picked(&self.moments.updates, keep);
         self.origins = picked(&self.origins, keep);
-        self.pull = Pull::default();
-        self.pull.resize(self.origins.len());
+        self.screen_gradient = ScreenGradient::default();
+        self.screen_gradient.resize(self.origins.len());
     }
 }
 
@@ -88,18 +88,18 @@ mod tests {
 
     #[test]
     fn entries_follow_their_gaussians() {
-        let mut ledger = Ledger::default();
-        ledger.enrol(2, 7);
-        ledger.enrol(3, 9);
-        ledger.moments.updates = vec![4, 5, 6];
-        ledger.divided(1);
+        let mut optimiser = OptimiserState::default();
+        optimiser.append(2, 7);
+        optimiser.append(3, 9);
+        optimiser.moments.updates = vec![4, 5, 6];
+        optimiser.divided(1);
         assert_eq!(
-            (&ledger.origins[..], &ledger.moments.updates[..]),
+            (&optimiser.origins[..], &optimiser.moments.updates[..]),
             (&[7, 7, 9, 7][..], &[4, 0, 6, 0][..])
         );
-        ledger.pull.add(&[1.0; 4], &[true; 4]);
-        ledger.select(&[2, 0]);
-        assert_eq!((&ledger.origins[..], &ledger.moments.updates[..]), (&[9, 7][..], &[6, 4][..]));
-        assert_eq!((ledger.moments.first.len(), ledger.pull.mean(1)), (2, 0.0));
+        optimiser.screen_gradient.add(&[1.0; 4], &[true; 4]);
+        optimiser.select(&[2, 0]);
+        assert_eq!((&optimiser.origins[..], &optimiser.moments.updates[..]), (&[9, 7][..], &[6, 4][..]));
+        assert_eq!((optimiser.moments.first.len(), optimiser.screen_gradient.mean(1)), (2, 0.0));
     }
 }

@@ -280,9 +280,15 @@ impl BundleAdjustment {
             let still = !self.settings.blur || count.still;
             let hold = [is_first || plan.only_motions, still, still || plan.only_motions];
             let step = PathStep { pixels: plan.path_pixels, hold };
-            frame.path_moments.step(&mut frame.path, &loss.by_path, &keyframe.prior, &keyframe.metric, step);
+            frame.path_moments.step(
+                &mut frame.path,
+                &loss.grad_path,
+                &keyframe.prior,
+                &keyframe.metric,
+                step,
+            );
             if !is_first {
-                frame.log_gain += frame.gain_moments.step(loss.by_log_gain, plan.log_gain);
+                frame.log_gain += frame.gain_moments.step(loss.grad_log_gain, plan.log_gain);
             }
         }
         frame.visits += 1;
@@ -309,8 +315,14 @@ impl BundleAdjustment {
             }
             let still = !self.settings.blur;
             let step = PathStep { pixels: plan.path_pixels * shrink, hold: [false, still, still] };
-            frame.path_moments.step(&mut frame.path, &loss.by_path, &unmapped.prior, &unmapped.metric, step);
-            frame.log_gain += frame.gain_moments.step(loss.by_log_gain, 0.01 * shrink);
+            frame.path_moments.step(
+                &mut frame.path,
+                &loss.grad_path,
+                &unmapped.prior,
+                &unmapped.metric,
+                step,
+            );
+            frame.log_gain += frame.gain_moments.step(loss.grad_log_gain, 0.01 * shrink);
         }
         *frame = best;
     }

@@ -17,7 +17,7 @@ pub struct GaussianLoss {
     renderer: ExposureRenderer,
     scratch: ExposureScratch,
     image: RasterImage,
-    by_image: RasterImage,
+    grad_image: RasterImage,
     planes: DisplayPlanes,
     ssim: Ssim,
     gradients: GaussianGradients,
@@ -32,7 +32,7 @@ impl GaussianLoss {
             renderer: ExposureRenderer::new(level),
             scratch: ExposureScratch::default(),
             image: RasterImage::default(),
-            by_image: RasterImage::default(),
+            grad_image: RasterImage::default(),
             planes: DisplayPlanes::default(),
             ssim: Ssim::new(level),
             gradients: GaussianGradients::default(),
@@ -55,12 +55,12 @@ impl GaussianLoss {
             let size = [camera.width, camera.height];
             terms.similarity = self.planes.add_similarity(&mut self.ssim, size, plan.weights.similarity);
         }
-        self.by_image.resize(camera.width, camera.height);
-        let by_log_gain = self.planes.gradient_by_light(image, &mut self.by_image);
-        terms.depth = compare_depth(image, seen, &plan.weights, &mut self.by_image);
+        self.grad_image.resize(camera.width, camera.height);
+        let grad_log_gain = self.planes.gradient_by_light(image, &mut self.grad_image);
+        terms.depth = compare_depth(image, seen, &plan.weights, &mut self.grad_image);
         self.gradients.reset(gaussians.len());
-        let by_path = self.renderer.backward(gaussians, &self.by_image, scratch, &mut self.gradients);
-        ExposureLoss { terms, by_path, by_log_gain }
+        let grad_path = self.renderer.backward(gaussians, &self.grad_image, scratch, &mut self.gradients);
+        ExposureLoss { terms, grad_path, grad_log_gain }
     }
 
     /// The picture of `exposure`, in linear light before the lens and the gain; the loss and its gradients are forgotten.

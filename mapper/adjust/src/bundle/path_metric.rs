@@ -79,8 +79,8 @@ impl PathMetric {
 
     /// The gradient by units from that by the tangent.
     #[must_use]
-    pub fn by_units(&self, path: &ExposurePath, by_tangent: &Vector6<f64>) -> Vector6<f64> {
-        self.tangent_from_unit.transpose() * turned(&path.mid().inverse(), by_tangent)
+    pub fn grad_units(&self, path: &ExposurePath, grad_tangent: &Vector6<f64>) -> Vector6<f64> {
+        self.tangent_from_unit.transpose() * turned(&path.mid().inverse(), grad_tangent)
     }
 }
 
@@ -109,12 +109,12 @@ fn movement(
     [along, down]: [f64; 2],
 ) -> RowVector6<f64> {
     let ray = camera.ray(u, v);
-    let by_x = along * camera.fx / depth;
-    let by_y = down * camera.fy / depth;
-    let by_point = Vector3::new(by_x, by_y, -(by_x * ray.x + by_y * ray.y));
-    // by_point . (x_c x dr) is (by_point x x_c) . dr.
-    let by_turn = by_point.cross(&(ray * depth));
-    RowVector6::new(-by_point.x, -by_point.y, -by_point.z, by_turn.x, by_turn.y, by_turn.z)
+    let grad_x = along * camera.fx / depth;
+    let grad_y = down * camera.fy / depth;
+    let grad_point = Vector3::new(grad_x, grad_y, -(grad_x * ray.x + grad_y * ray.y));
+    // grad_point . (x_c x dr) is (grad_point x x_c) . dr.
+    let grad_turn = grad_point.cross(&(ray * depth));
+    RowVector6::new(-grad_point.x, -grad_point.y, -grad_point.z, grad_turn.x, grad_turn.y, grad_turn.z)
 }
 
 /// A matrix C with `C^T A C` the identity, but for directions that A has next to nothing of, and its inverse.
@@ -195,9 +195,9 @@ mod tests {
         let units = Vector6::new(0.3, -0.2, 0.5, 0.1, -0.4, 0.2);
         let tangent = metric.tangent(&path, &units);
         assert!((metric.units(&path, &tangent) - units).norm() < 1e-9);
-        let by_tangent = Vector6::new(1.0, 2.0, -1.0, 0.5, 3.0, -2.0);
-        let change = by_tangent.dot(&tangent);
-        assert!((metric.by_units(&path, &by_tangent).dot(&units) - change).abs() < 1e-9);
+        let grad_tangent = Vector6::new(1.0, 2.0, -1.0, 0.5, 3.0, -2.0);
+        let change = grad_tangent.dot(&tangent);
+        assert!((metric.grad_units(&path, &grad_tangent).dot(&units) - change).abs() < 1e-9);
     }
 
     #[test]

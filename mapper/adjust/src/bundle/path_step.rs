@@ -75,7 +75,7 @@ impl PathMoments {
         metric: &PathMetric,
         step: PathStep,
     ) {
-        let blocks = by_coordinates(gradient).map(|block| metric.by_units(path, &block));
+        let blocks = grad_coordinates(gradient).map(|block| metric.grad_units(path, &block));
         self.updates += 1;
         let updates = self.updates.min(10_000) as i32;
         let corrections = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powi(updates)));
@@ -107,15 +107,15 @@ impl PathMoments {
         metric: &PathMetric,
     ) -> [Vector6<f64>; 3] {
         let drift = metric.units(path, &prior.middle.tangent_to(&path.ends.mid()));
-        let by_motion = metric.by_units(path, &prior.gradient_by_motion(path));
-        let by_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
-        [middle + drift * MIDDLE_COST, motion + capped(by_motion, typical), bow + capped(by_bow, typical)]
+        let grad_motion = metric.grad_units(path, &prior.grad_motion(path));
+        let grad_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
+        [middle + drift * MIDDLE_COST, motion + capped(grad_motion, typical), bow + capped(grad_bow, typical)]
     }
 }
 
 impl PathPrior {
     /// Gradient of the prior by the motion.
-    fn gradient_by_motion(&self, path: &ExposurePath) -> Vector6<f64> {
+    fn grad_motion(&self, path: &ExposurePath) -> Vector6<f64> {
         let Some(prediction) = self.motion else { return Vector6::zeros() };
         let [t, r] = [prediction.translation_sigma, prediction.rotation_sigma].map(|sigma| sigma * sigma);
         let variance = Vector6::new(t, t, t, r, r, r);
@@ -130,7 +130,7 @@ fn capped(vector: Vector6<f64>, length: f64) -> Vector6<f64> {
 }
 
 /// Gradients by middle, motion and bow.
-fn by_coordinates(gradient: &SVector<f64, PATH_PARAMETERS>) -> [Vector6<f64>; 3] {
+fn grad_coordinates(gradient: &SVector<f64, PATH_PARAMETERS>) -> [Vector6<f64>; 3] {
     let part = |first: usize| Vector6::from_iterator(gradient.iter().copied().skip(first).take(6));
     let [start, end, bow] = [part(0), part(6), part(12)];
     [start + end, (end - start) * 0.5, bow]

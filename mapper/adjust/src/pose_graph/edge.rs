@@ -25,8 +25,8 @@ pub struct PoseGraphEdge {
 pub(super) struct LinearEdge {
     pub(super) residual: Vector6<f64>,
     /// Derivatives by the tangent vectors of both poses ([`RigidTransform::perturbed`]).
-    pub(super) by_from: Matrix6<f64>,
-    pub(super) by_to: Matrix6<f64>,
+    pub(super) jacobian_from: Matrix6<f64>,
+    pub(super) jacobian_to: Matrix6<f64>,
 }
 
 impl PoseGraphEdge {
@@ -60,17 +60,21 @@ impl PoseGraphEdge {
         let from_from_world = world_from_from.rotation_matrix().transpose();
         let difference = self.from_from_to.tangent_to(&between);
         let turn: Vector3<f64> = difference.fixed_rows::<3>(3).into();
-        let by_turn = so3::right_jacobian_inverse(&turn) / self.rotation_sigma;
-        let by_shift = from_from_world / self.translation_sigma;
-        let (mut by_from, mut by_to) = (Matrix6::zeros(), Matrix6::zeros());
-        set_block(&mut by_from, [0, 0], -by_shift);
+        let jacobian_turn = so3::right_jacobian_inverse(&turn) / self.rotation_sigma;
+        let jacobian_shift = from_from_world / self.translation_sigma;
+        let (mut jacobian_from, mut jacobian_to) = (Matrix6::zeros(), Matrix6::zeros());
+        set_block(&mut jacobian_from, [0, 0], -jacobian_shift);
         // exp(-d) x = x + [x] d to first order.
-        set_block(&mut by_from, [0, 3], so3::hat(&between.translation) / self.translation_sigma);
+        set_block(&mut jacobian_from, [0, 3], so3::hat(&between.translation) / self.translation_sigma);
         // Q^T exp(-d) Q = exp(-Q^T d).
-        set_block(&mut by_from, [3, 3], -by_turn * between.rotation_matrix().transpose());
-        set_block(&mut by_to, [0, 0], by_shift);
-        set_block(&mut by_to, [3, 3], by_turn);
-        LinearEdge { residual: self.whitened(&difference.fixed_rows::<3>(0).into(), &turn), by_from, by_to }
+        set_block(&mut jacobian_from, [3, 3], -jacobian_turn * between.rotation_matrix().transpose());
+        set_block(&mut jacobian_to, [0, 0], jacobian_shift);
+        set_block(&mut jacobian_to, [3, 3], jacobian_turn);
+        LinearEdge {
+            residual: self.whitened(&difference.fixed_rows::<3>(0).into(), &turn),
+            jacobian_from,
+            jacobian_to,
+        }
     }
 
     fn whitened(&self, shift: &Vector3<f64>, turn: &Vector3<f64>) -> Vector6<f64> {
@@ -109,13 +113,13 @@ mod tests {
         for k in 0..6 {
             let by = Vector6::from_fn(|row, _| if row == k { STEP } else { 0.0 });
             let central = |plus: Vector6<f64>, minus: Vector6<f64>| (plus - minus) / (2.0 * STEP);
-            let by_from =
+            let jacobian_from =
                 central(edge.residual(&from.perturbed(&by), &to), edge.residual(&from.perturbed(&-by), &to));
-            let by_to =
+            let jacobian_to =
                 central(edge.residual(&from, &to.perturbed(&by)), edge.residual(&from, &to.perturbed(&-by)));
             // Entries are up to 1/sigma = 200 and more.
-            assert!((by_from - linear.by_from.column(k)).norm() < 1e-5, "column {k} by from");
-            assert!((by_to - linear.by_to.column(k)).norm() < 1e-5, "column {k} by to");
+            assert!((jacobian_from - linear.jacobian_from.column(k)).norm() < 1e-5, "column {k} by from");
+            assert!((jacobian_to - linear.jacobian_to.column(k)).norm() < 1e-5, "column {k} by to");
         }
     }
 }

@@ -36,7 +36,7 @@ impl NormalEquations {
 
     /// Adds an edge between two nodes; those that are held are none.
     pub(super) fn add(&mut self, edge: &LinearEdge, weight: f64, from: Option<usize>, to: Option<usize>) {
-        for (node, jacobian) in [(from, &edge.by_from), (to, &edge.by_to)] {
+        for (node, jacobian) in [(from, &edge.jacobian_from), (to, &edge.jacobian_to)] {
             if let Some(node) = node {
                 self.diagonal[node] += jacobian.transpose() * jacobian * weight;
                 let descent: Vector6<f64> = jacobian.transpose() * edge.residual * -weight;
@@ -47,9 +47,11 @@ impl NormalEquations {
         }
         match (from, to) {
             (Some(from), Some(to)) if from < to => {
-                self.push(from, to, &(edge.by_from.transpose() * edge.by_to * weight));
+                self.push(from, to, &(edge.jacobian_from.transpose() * edge.jacobian_to * weight));
             }
-            (Some(from), Some(to)) => self.push(to, from, &(edge.by_to.transpose() * edge.by_from * weight)),
+            (Some(from), Some(to)) => {
+                self.push(to, from, &(edge.jacobian_to.transpose() * edge.jacobian_from * weight))
+            }
             _ => (),
         }
     }

@@ -57,12 +57,12 @@ pub(super) struct Sums {
     pub(super) colour: f32,
     pub(super) depth: f32,
     pub(super) mean_square: f32,
-    pub(super) by_log_gain: f32,
-    pub(super) by_log_sharpness: f32,
+    pub(super) grad_log_gain: f32,
+    pub(super) grad_log_sharpness: f32,
     pub(super) distance_decoder: Layers<1>,
     pub(super) colour_decoder: Layers<3>,
     /// Gradient by the tangent of each view's pose.
-    pub(super) by_view: Vec<Vector6<f64>>,
+    pub(super) grad_view: Vec<Vector6<f64>>,
 }
 
 /// A pixel that was chosen.
@@ -99,7 +99,7 @@ pub(super) struct Chunk {
     geometry: FieldSamples<1>,
     opacities: Vec<Opacity>,
     weights: Vec<f32>,
-    by_weights: Vec<f32>,
+    grad_weights: Vec<f32>,
     /// Samples that have a colour.
     lit: Vec<u32>,
     colour: FieldSamples<3>,
@@ -113,8 +113,8 @@ impl Chunk {
     /// Geometry samples and colour samples with the gradients by their features.
     pub(super) fn groups(&self) -> [Group<'_>; 2] {
         [
-            (self.geometry.points(), self.geometry.by_features()),
-            (self.colour.points(), self.colour.by_features()),
+            (self.geometry.points(), self.geometry.grad_features()),
+            (self.colour.points(), self.colour.grad_features()),
         ]
     }
 
@@ -126,7 +126,7 @@ impl Chunk {
     /// Everything for chunk `index` of a job.
     pub(super) fn run(&mut self, job: &Job<'_>, index: usize) {
         let mut random = Pcg32::new(job.seed, job.stream + index as u64);
-        self.sums = Sums { by_view: vec![Vector6::zeros(); job.views.len()], ..Sums::default() };
+        self.sums = Sums { grad_view: vec![Vector6::zeros(); job.views.len()], ..Sums::default() };
         self.choose(job, CHUNK.min(job.pixels - index * CHUNK), &mut random);
         self.find_surfaces(job);
         self.place_samples(job, &mut random);
@@ -240,28 +240,28 @@ impl Chunk {
     fn backward(&mut self, job: &Job<'_>) {
         self.geometry.start_backward();
         self.colour.start_backward();
-        self.by_weights.clear();
-        self.by_weights.resize(self.z.len(), 0.0);
+        self.grad_weights.clear();
+        self.grad_weights.resize(self.z.len(), 0.0);
         let RayViews { per_pixel, of_light, of_depth, .. } = job.rays;
-        let mut by_light = Vec::with_capacity(self.rays.len());
+        let mut grad_light = Vec::with_capacity(self.rays.len());
         for k in 0..self.pixels.len() {
-            let by_pixel = self.compare_colour(job, k);
-            by_light.extend((0..of_light).map(|_| by_pixel.map(|by| by / of_light as f32)));
-            by_light.extend((of_light..per_pixel).map(|_| [0.0; 3]));
+            let grad_pixel = self.compare_colour(job, k);
+            grad_light.extend((0..of_light).map(|_| grad_pixel.map(|by| by / of_light as f32)));
+            grad_light.extend((of_light..per_pixel).map(|_| [0.0; 3]));
             if self.pixels[k].measured > 0.0 {
                 self.compare_depth(job, k, k * per_pixel + of_depth);
             }
         }
-        self.colours_backward(job, &by_light);
+        self.colours_backward(job, &grad_light);
         for ray in &self.rays {
             let range = ray.start..ray.end;
-            self.sums.by_log_sharpness += weigh_backward(
+            self.sums.grad_log_sharpness += weigh_backward(
                 job.field.sharpness,
                 &self.geometry.values.as_flattened()[range.clone()],
                 &self.opacities[range.clone()],
                 &self.weights[range.clone()],
-                &self.by_weights[range.clone()],
-                &mut self.geometry.by_outputs[range],
+                &self.grad_weights[range.clone()],
+                &mut self.geometry.grad_outputs[range],
             );
         }
         job.field.distances_backward(&mut self.geometry, job.with_path, &mut self.sums.distance_decoder);
@@ -285,12 +285,12 @@ impl Chunk {
             if byte >= CLIPPED && value > target {
                 return 0.0;
             }
-            let (loss, by_value) = smooth_absolute(value - target, NOISE);
+            let (loss, grad_value) = smooth_absolute(value - target, NOISE);
             self.sums.colour += job.weights.colour * share * loss;
             self.sums.mean_square += share * (value - target) * (value - target);
-            let by_light = job.weights.colour * share * by_value * slope * gain;
-            self.sums.by_log_gain += by_light * light;
-            by_light
+            let grad_light = job.weights.colour * share * grad_value * slope * gain;
+            self.sums.grad_log_gain += grad_light * light;
+            grad_light
         })
     }
 
@@ -302,13 +302,13 @@ impl Chunk {
         let per_pixel = 1.0 / job.pixels as f32;
         let off = self.depth[ray] - measured;
         self.sums.depth += weights.depth * per_pixel * off * off;
-        let by_depth = 2.0 * weights.depth * per_pixel * off;
+        let grad_depth = 2.0 * weights.depth * per_pixel * off;
         let front =
             per_pixel * weights.free_space / (job.sampling.front + job.sampling.band / 6).max(1) as f32;
         let band = per_pixel / job.sampling.band.max(1) as f32;
         for sample in self.rays[ray].start..self.rays[ray].end {
             let (z, s) = (self.z[sample], self.geometry.values[sample][0]);
-            self.by_weights[sample] += by_depth * z;
+            self.grad_weights[sample] += grad_depth * z;
             let ahead = (measured - z) / truncation;
             let (loss, by) = if ahead > 1.0 {
                 (front * (s - 1.0) * (s - 1.0), 2.0 * front * (s - 1.0))
@@ -320,19 +320,19 @@ impl Chunk {
                 continue;
             };
             self.sums.depth += loss;
-            self.geometry.by_outputs[sample][0] += by;
+            self.geometry.grad_outputs[sample][0] += by;
         }
     }
 
     /// Takes the gradient by the light of rays to colours and weights.
-    fn colours_backward(&mut self, job: &Job<'_>, by_light: &[[f32; 3]]) {
+    fn colours_backward(&mut self, job: &Job<'_>, grad_light: &[[f32; 3]]) {
         let mut lit = self.lit.iter().enumerate().peekable();
-        for (ray, by_light) in self.rays.iter().zip(by_light) {
+        for (ray, grad_light) in self.rays.iter().zip(grad_light) {
             while let Some((place, sample)) = lit.next_if(|(_, sample)| (**sample as usize) < ray.end) {
                 let sample = *sample as usize;
                 let colour = self.colour.values[place];
-                self.by_weights[sample] += (0..3).map(|c| colour[c] * by_light[c]).sum::<f32>();
-                self.colour.by_outputs[place] = by_light.map(|by| by * self.weights[sample]);
+                self.grad_weights[sample] += (0..3).map(|c| colour[c] * grad_light[c]).sum::<f32>();
+                self.colour.grad_outputs[place] = grad_light.map(|by| by * self.weights[sample]);
             }
         }
         job.field.colours_backward(&mut self.colour, job.with_path, &mut self.sums.colour_decoder);
@@ -341,14 +341,14 @@ impl Chunk {
     /// Sums up the gradients by points to those by the poses of the views: with a point `x = p + R y`, `dx/dp` is one
     /// and `dx/dr = -R [y]x`.
     fn poses_backward(&mut self, job: &Job<'_>) {
-        for (sample, by) in self.lit.iter().zip(&self.colour.by_points) {
-            let sum = &mut self.geometry.by_points[*sample as usize];
+        for (sample, by) in self.lit.iter().zip(&self.colour.grad_points) {
+            let sum = &mut self.geometry.grad_points[*sample as usize];
             sum.iter_mut().zip(by).for_each(|(sum, by)| *sum += by);
         }
         for ray in &self.rays {
             let (mut shift, mut lever) = ([0.0; 3], [0.0; 3]);
             for sample in ray.start..ray.end {
-                for (axis, by) in self.geometry.by_points[sample].iter().enumerate() {
+                for (axis, by) in self.geometry.grad_points[sample].iter().enumerate() {
                     shift[axis] += by;
                     lever[axis] += by * self.z[sample];
                 }
@@ -357,7 +357,7 @@ impl Chunk {
             let slope = self.pixels[ray.pixel].slope.map(f64::from);
             let turn = Vector3::new(slope[0], slope[1], 1.0).cross(&Vector3::from(lever));
             let [x, y, z] = shift.map(f64::from);
-            self.sums.by_view[ray.view] += Vector6::new(x, y, z, turn.x, turn.y, turn.z);
+            self.sums.grad_view[ray.view] += Vector6::new(x, y, z, turn.x, turn.y, turn.z);
         }
     }
 }

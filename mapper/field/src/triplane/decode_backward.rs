@@ -38,7 +38,7 @@ struct Tile {
     second: [Units; TILE],
 }
 
-/// Adds the gradient by the weights to `by_layers` and stores that by the features, given the one by the outputs before
+/// Adds the gradient by the weights to `grad_layers` and stores that by the features, given the one by the outputs before
 /// their activation. All buffers have the padded length of `samples`.
 #[inline(always)]
 pub(super) fn decode_backward<S: Simd, const OUTPUTS: usize>(
@@ -46,23 +46,35 @@ pub(super) fn decode_backward<S: Simd, const OUTPUTS: usize>(
     layers: &Layers<OUTPUTS>,
     transposed: &Transposed,
     samples: &Activations<OUTPUTS>,
-    by_outputs: &[[f32; OUTPUTS]],
-    by_features: &mut [[f32; FEATURES]],
-    by_layers: &mut Layers<OUTPUTS>,
+    grad_outputs: &[[f32; OUTPUTS]],
+    grad_features: &mut [[f32; FEATURES]],
+    grad_layers: &mut Layers<OUTPUTS>,
 ) {
     let mut tile = Tile { first: [[0.0; HIDDEN]; TILE], second: [[0.0; HIDDEN]; TILE] };
     let mut start = 0;
-    while start < by_outputs.len() {
-        let range = start..(start + TILE).min(by_outputs.len());
+    while start < grad_outputs.len() {
+        let range = start..(start + TILE).min(grad_outputs.len());
         let count = range.len();
         let hidden = samples.hidden.each_ref().map(|layer| &layer[range.clone()]);
-        let by_outputs = &by_outputs[range.clone()];
-        last_layer(simd, layers, hidden[1], by_outputs, &mut tile.second, by_layers);
+        let grad_outputs = &grad_outputs[range.clone()];
+        last_layer(simd, layers, hidden[1], grad_outputs, &mut tile.second, grad_layers);
         through(simd, &transposed.second, hidden[0], &tile.second, &mut tile.first);
-        to_features(simd, transposed, &tile.first, &mut by_features[range.clone()]);
-        by_weights(simd, hidden[0], &tile.second[..count], &mut by_layers.second, &mut by_layers.second_bias);
+        to_features(simd, transposed, &tile.first, &mut grad_features[range.clone()]);
+        grad_weights(
+            simd,
+            hidden[0],
+            &tile.second[..count],
+            &mut grad_layers.second,
+            &mut grad_layers.second_bias,
+        );
         let features = &samples.features[range];
-        by_weights(simd, features, &tile.first[..count], &mut by_layers.first, &mut by_layers.first_bias);
+        grad_weights(
+            simd,
+            features,
+            &tile.first[..count],
+            &mut grad_layers.first,
+            &mut grad_layers.first_bias,
+        );
         start += TILE;
     }
 }
@@ -73,23 +85,23 @@ fn last_layer<S: Simd, const OUTPUTS: usize>(
     simd: S,
     layers: &Layers<OUTPUTS>,
     hidden: &[Units],
-    by_outputs: &[[f32; OUTPUTS]],
+    grad_outputs: &[[f32; OUTPUTS]],
     out: &mut [Units; TILE],
-    by_layers: &mut Layers<OUTPUTS>,
+    grad_layers: &mut Layers<OUTPUTS>,
 ) {
     let zero = f32x16::splat(simd, 0.0);
     for (output, row) in layers.last.iter().enumerate() {
         let row = f32x16::load_array_ref(simd, row);
-        let mut sum = f32x16::load_array_ref(simd, &by_layers.last[output]);
-        for ((hidden, by_outputs), out) in hidden.iter().zip(by_outputs).zip(&mut *out) {
+        let mut sum = f32x16::load_array_ref(simd, &grad_layers.last[output]);
+        for ((hidden, grad_outputs), out) in hidden.iter().zip(grad_outputs).zip(&mut *out) {
             let hidden = f32x16::load_array_ref(simd, hidden);
-            sum = hidden.mul_add(by_outputs[output], sum);
-            by_layers.last_bias[output] += by_outputs[output];
+            sum = hidden.mul_add(grad_outputs[output], sum);
+            grad_layers.last_bias[output] += grad_outputs[output];
             let before = if output == 0 { zero } else { f32x16::load_array_ref(simd, out) };
-            let by_hidden = row.mul_add(by_outputs[output], before);
-            hidden.simd_gt(0.0).select(by_hidden, zero).store_array(out);
+            let grad_hidden = row.mul_add(grad_outputs[output], before);
+            hidden.simd_gt(0.0).select(grad_hidden, zero).store_array(out);
         }
-        sum.store_array(&mut by_layers.last[output]);
+        sum.store_array(&mut grad_layers.last[output]);
     }
 }
 
@@ -99,13 +111,13 @@ fn through<S: Simd>(
     simd: S,
     rows: &[Units; HIDDEN],
     hidden: &[Units],
-    by_sums: &[Units; TILE],
+    grad_sums: &[Units; TILE],
     out: &mut [Units; TILE],
 ) {
     let zero = f32x16::splat(simd, 0.0);
-    let blocks = by_sums.as_chunks::<BLOCK>().0.iter().zip(out.as_chunks_mut::<BLOCK>().0);
-    for (hidden, (by_sums, out)) in hidden.as_chunks::<BLOCK>().0.iter().zip(blocks) {
-        let products = multiply(simd, rows, zero, by_sums);
+    let blocks = grad_sums.as_chunks::<BLOCK>().0.iter().zip(out.as_chunks_mut::<BLOCK>().0);
+    for (hidden, (grad_sums, out)) in hidden.as_chunks::<BLOCK>().0.iter().zip(blocks) {
+        let products = multiply(simd, rows, zero, grad_sums);
         for ((product, hidden), out) in products.into_iter().zip(hidden).zip(out) {
             let active = f32x16::load_array_ref(simd, hidden).simd_gt(0.0);
             active.select(product, zero).store_array(out);
@@ -118,13 +130,13 @@ fn through<S: Simd>(
 fn to_features<S: Simd>(
     simd: S,
     transposed: &Transposed,
-    by_sums: &[Units; TILE],
+    grad_sums: &[Units; TILE],
     out: &mut [[f32; FEATURES]],
 ) {
     let zero = f32x16::splat(simd, 0.0);
-    for (out, by_sums) in out.as_chunks_mut::<BLOCK>().0.iter_mut().zip(by_sums.as_chunks::<BLOCK>().0) {
+    for (out, grad_sums) in out.as_chunks_mut::<BLOCK>().0.iter_mut().zip(grad_sums.as_chunks::<BLOCK>().0) {
         for (part, rows) in transposed.first.iter().enumerate() {
-            let products = multiply(simd, rows, zero, by_sums);
+            let products = multiply(simd, rows, zero, grad_sums);
             for (product, out) in products.into_iter().zip(&mut *out) {
                 product.store_slice(&mut out[part * HIDDEN..(part + 1) * HIDDEN]);
             }
@@ -134,25 +146,25 @@ fn to_features<S: Simd>(
 
 /// Adds the gradient by weights and biases of a layer: sums stay in registers over all samples.
 #[inline(always)]
-fn by_weights<S: Simd, const INPUTS: usize>(
+fn grad_weights<S: Simd, const INPUTS: usize>(
     simd: S,
     inputs: &[[f32; INPUTS]],
-    by_sums: &[Units],
+    grad_sums: &[Units],
     out: &mut [Units; INPUTS],
-    by_bias: &mut Units,
+    grad_bias: &mut Units,
 ) {
-    let mut bias = f32x16::load_array_ref(simd, by_bias);
-    for by_sums in by_sums {
-        bias += f32x16::load_array_ref(simd, by_sums);
+    let mut bias = f32x16::load_array_ref(simd, grad_bias);
+    for grad_sums in grad_sums {
+        bias += f32x16::load_array_ref(simd, grad_sums);
     }
-    bias.store_array(by_bias);
+    bias.store_array(grad_bias);
     for (part, rows) in out.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
         let first = part * BLOCK;
         let mut sums = [f32x16::splat(simd, 0.0); BLOCK];
-        for (inputs, by_sums) in inputs.iter().zip(by_sums) {
-            let by_sums = f32x16::load_array_ref(simd, by_sums);
+        for (inputs, grad_sums) in inputs.iter().zip(grad_sums) {
+            let grad_sums = f32x16::load_array_ref(simd, grad_sums);
             for (sum, input) in sums.iter_mut().zip(&inputs[first..first + BLOCK]) {
-                *sum = by_sums.mul_add(*input, *sum);
+                *sum = grad_sums.mul_add(*input, *sum);
             }
         }
         for (sum, row) in sums.into_iter().zip(rows) {

@@ -78,11 +78,11 @@ fn features_at<S: Simd>(simd: S, planes: &PlanesView<'_>, cells: &Cells, point: 
 /// Stores the gradients by the coordinates of `points`, given those by their features. Outside of the box features do
 /// not change, and the gradient is zero.
 #[inline(always)]
-pub(super) fn by_points<S: Simd>(
+pub(super) fn grad_points<S: Simd>(
     simd: S,
     levels: &[PlanesView<'_>; 2],
     points: Points<'_>,
-    by_features: &[[f32; FEATURES]],
+    grad_features: &[[f32; FEATURES]],
     out: &mut [[f32; 3]],
 ) {
     let mut cells = [Cells::NONE; 2];
@@ -92,11 +92,11 @@ pub(super) fn by_points<S: Simd>(
         let points = tile(points, start);
         find(simd, levels, points, &mut cells);
         let range = start..start + points[0].len();
-        let pairs = out[range.clone()].iter_mut().zip(&by_features[range]);
-        for (point, (out, by_features)) in pairs.take(TILE).enumerate() {
+        let pairs = out[range.clone()].iter_mut().zip(&grad_features[range]);
+        for (point, (out, grad_features)) in pairs.take(TILE).enumerate() {
             let mut sums = [f32x8::splat(simd, 0.0); 3];
             for (level, planes) in levels.iter().enumerate() {
-                let gradient = &by_features[level * CHANNELS..(level + 1) * CHANNELS];
+                let gradient = &grad_features[level * CHANNELS..(level + 1) * CHANNELS];
                 add_by_place(simd, planes, &cells[level], point, gradient, &mut sums);
             }
             for axis in 0..3 {
@@ -115,7 +115,7 @@ fn add_by_place<S: Simd>(
     planes: &PlanesView<'_>,
     cells: &Cells,
     point: usize,
-    by_features: &[f32],
+    grad_features: &[f32],
     sums: &mut [f32x8<S>; 3],
 ) {
     for (plane, axes) in PLANE_AXES.into_iter().enumerate() {
@@ -123,7 +123,7 @@ fn add_by_place<S: Simd>(
         let values = planes.values[plane];
         let [near, far] =
             [row(simd, values, start), row(simd, values, start + planes.columns(plane) * CHANNELS)];
-        for (k, gradient) in by_features.as_chunks::<LANES>().0.iter().enumerate() {
+        for (k, gradient) in grad_features.as_chunks::<LANES>().0.iter().enumerate() {
             let gradient = f32x8::load_array_ref(simd, gradient) * planes.cells_per_metre;
             let [along_near, along_far] = [near[1][k] - near[0][k], far[1][k] - far[0][k]];
             let along = (along_far - along_near).mul_add(v, along_near);

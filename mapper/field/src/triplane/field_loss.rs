@@ -101,20 +101,20 @@ impl FieldLoss {
     /// Adds up what the chunks have, in their order.
     fn sum_up(&mut self, path: &ExposurePath, times: &[f64], count: usize) -> ExposureLoss {
         let mut terms = LossTerms::default();
-        let mut by_path = SVector::<f64, PATH_PARAMETERS>::zeros();
-        let mut by_log_gain = 0.0;
+        let mut grad_path = SVector::<f64, PATH_PARAMETERS>::zeros();
+        let mut grad_log_gain = 0.0;
         let jacobians: Vec<_> = times.iter().map(|time| path.pose_jacobian(*time).transpose()).collect();
         for Chunk { sums, .. } in &self.chunks[..count] {
             terms.colour += f64::from(sums.colour);
             terms.depth += f64::from(sums.depth);
             terms.mean_square += f64::from(sums.mean_square);
-            by_log_gain += f64::from(sums.by_log_gain);
-            jacobians.iter().zip(&sums.by_view).for_each(|(jacobian, by)| by_path += jacobian * by);
+            grad_log_gain += f64::from(sums.grad_log_gain);
+            jacobians.iter().zip(&sums.grad_view).for_each(|(jacobian, by)| grad_path += jacobian * by);
             self.gradients.distance_decoder.add(&sums.distance_decoder);
             self.gradients.colour_decoder.add(&sums.colour_decoder);
-            self.gradients.log_sharpness += sums.by_log_sharpness;
+            self.gradients.log_sharpness += sums.grad_log_sharpness;
         }
-        ExposureLoss { terms, by_path, by_log_gain }
+        ExposureLoss { terms, grad_path, grad_log_gain }
     }
 
     /// Gradients by the field of the last exposure, for an optimiser.
@@ -274,13 +274,13 @@ mod tests {
         let (field, path) = (lively_field(), path());
         let at = |log: f64| evaluated(Level::new(), &field, &path, log.exp(), 3).0;
         let numeric = (at(1e-2).terms.total() - at(-1e-2).terms.total()) / 2e-2;
-        let analytic = at(0.0).by_log_gain;
+        let analytic = at(0.0).grad_log_gain;
         assert!((analytic - numeric).abs() < 0.02 * numeric.abs(), "{analytic}, not {numeric}");
     }
 
     /// Loss and gradients by the tangents of views, of which only what the field sees is moved: where samples lie on
     /// their rays does not count as a function of the pose.
-    fn by_views(moved: Option<(usize, Vector6<f64>)>) -> (f64, Vec<Vector6<f64>>) {
+    fn grad_views(moved: Option<(usize, Vector6<f64>)>) -> (f64, Vec<Vector6<f64>>) {
         let (field, path, seen) = (lively_field(), path(), observation());
         let prepared = Prepared::new(Level::new(), &field);
         let curve = DisplayCurve::new(&sensor().inverse_response);
@@ -308,17 +308,18 @@ mod tests {
         };
         let mut chunk = Chunk::default();
         chunk.run(&job, 0);
-        (f64::from(chunk.sums.colour) + f64::from(chunk.sums.depth), chunk.sums.by_view)
+        (f64::from(chunk.sums.colour) + f64::from(chunk.sums.depth), chunk.sums.grad_view)
     }
 
     #[test]
     fn gradients_by_poses_are_those_of_finite_differences() {
-        let (_, gradients) = by_views(None);
+        let (_, gradients) = grad_views(None);
         for (view, gradient) in gradients.iter().enumerate() {
             for k in 0..6 {
                 let mut tangent = Vector6::zeros();
                 tangent[k] = 1e-3;
-                let numeric = (by_views(Some((view, tangent))).0 - by_views(Some((view, -tangent))).0) / 2e-3;
+                let numeric =
+                    (grad_views(Some((view, tangent))).0 - grad_views(Some((view, -tangent))).0) / 2e-3;
                 let error = (numeric - gradient[k]).abs();
                 assert!(error < 0.03 * gradient.norm() + 1e-3, "view {view}, {k}: {gradient}, not {numeric}");
             }
@@ -359,11 +360,11 @@ mod tests {
     fn the_gradient_by_a_path_of_rows_leads_down() {
         let path = path();
         let at_path = rolling(&path, true);
-        let step = at_path.by_path * (2e-4 / at_path.by_path.norm());
+        let step = at_path.grad_path * (2e-4 / at_path.grad_path.norm());
         let slope = rolling(&path.perturbed(&step), false).terms.total()
             - rolling(&path.perturbed(&-step), false).terms.total();
         // Where samples lie changes with the poses too, and is no part of the gradient.
-        let expected = 2.0 * step.dot(&at_path.by_path);
+        let expected = 2.0 * step.dot(&at_path.grad_path);
         assert!((slope / expected - 1.0).abs() < 0.3, "{slope} instead of {expected}");
     }
 
@@ -375,14 +376,14 @@ mod tests {
             pool.install(|| evaluated(Level::new(), &field, &path, 1.0, 5))
         };
         let ((one, of_one), (three, of_three)) = (with_threads(1), with_threads(3));
-        assert_eq!((one.terms, one.by_path), (three.terms, three.by_path));
+        assert_eq!((one.terms, one.grad_path), (three.terms, three.grad_path));
         for (one, three) in of_one.planes.iter().zip(&of_three.planes) {
             assert_eq!((&one.sums, &one.touched), (&three.sums, &three.touched));
         }
         for level in mba_tracker::simd::levels_up_to(Level::new()) {
             let (other, _) = evaluated(level, &field, &path, 1.0, 5);
             assert!((other.terms.total() - one.terms.total()).abs() < 1e-4 * one.terms.total());
-            assert!((other.by_path - one.by_path).norm() < 1e-2 * one.by_path.norm());
+            assert!((other.grad_path - one.grad_path).norm() < 1e-2 * one.grad_path.norm());
         }
     }
 
@@ -392,6 +393,6 @@ mod tests {
         seen.region.right = 0;
         let exposure = Exposure { seen: &seen, path: &path(), gain: 1.0, views: 3 };
         let loss = FieldLoss::new(Level::new(), &sensor()).evaluate(&lively_field(), &drawn(exposure));
-        assert_eq!((loss.terms.total(), loss.by_log_gain), (0.0, 0.0));
+        assert_eq!((loss.terms.total(), loss.grad_log_gain), (0.0, 0.0));
     }
 }

@@ -8,7 +8,7 @@ use super::field::TriplaneField;
 use super::layers::Layers;
 use super::planes::FeaturePlanes;
 use super::prepared::Prepared;
-use super::scatter::{PlaneSums, by_plane, nodes_of_cells};
+use super::scatter::{PlaneSums, nodes_of_cells, sums_of_plane};
 use super::settings::{CHANNELS, FEATURES};
 
 /// Planes of a field: geometry coarse, geometry fine, colour coarse, colour fine, each xy, xz and yz.
@@ -59,8 +59,8 @@ impl FieldGradients {
         }
         tasks.into_par_iter().for_each(|(plane, mut out, levels, groups)| {
             let mut sums = out.each_mut().map(|out| PlaneSums { sums: &mut out.sums, cells: &mut out.touched });
-            for (points, by_features) in groups {
-                dispatch!(field.level, simd => by_plane(simd, levels, plane, *points, by_features, &mut sums));
+            for (points, grad_features) in groups {
+                dispatch!(field.level, simd => sums_of_plane(simd, levels, plane, *points, grad_features, &mut sums));
             }
             let pairs = out.into_iter().zip(levels);
             pairs.for_each(|(out, planes)| nodes_of_cells(&mut out.touched, planes.columns(plane)));

@@ -41,7 +41,7 @@ pub(super) fn weigh(opacities: &[Opacity], weights: &mut [f32]) -> f32 {
     1.0 - behind
 }
 
-/// Adds the gradient by the signed distances of a ray's samples to `by_distances`, given that by their weights, and
+/// Adds the gradient by the signed distances of a ray's samples to `grad_distances`, given that by their weights, and
 /// returns the gradient by the logarithm of the sharpness.
 ///
 /// With the density `q = beta y`, `y = sigmoid(-beta s)`, and light T that arrives at a sample: the gradient by q is
@@ -51,22 +51,22 @@ pub(super) fn weigh_backward(
     distances: &[f32],
     opacities: &[Opacity],
     weights: &[f32],
-    by_weights: &[f32],
-    by_distances: &mut [[f32; 1]],
+    grad_weights: &[f32],
+    grad_distances: &mut [[f32; 1]],
 ) -> f32 {
     let mut arriving = 1.0;
-    let mut later: f32 = weights.iter().zip(by_weights).map(|(weight, by)| weight * by).sum();
-    let mut by_log_sharpness = 0.0;
+    let mut later: f32 = weights.iter().zip(grad_weights).map(|(weight, by)| weight * by).sum();
+    let mut grad_log_sharpness = 0.0;
     for i in 0..weights.len() {
         let Opacity { alpha, inside } = opacities[i];
-        later -= weights[i] * by_weights[i];
+        later -= weights[i] * grad_weights[i];
         arriving *= 1.0 - alpha;
-        let by_density = arriving * by_weights[i] - later;
+        let grad_density = arriving * grad_weights[i] - later;
         let steep = sharpness * inside * (1.0 - inside);
-        by_distances[i][0] -= by_density * sharpness * steep;
-        by_log_sharpness += by_density * sharpness * (inside - distances[i] * steep);
+        grad_distances[i][0] -= grad_density * sharpness * steep;
+        grad_log_sharpness += grad_density * sharpness * (inside - distances[i] * steep);
     }
-    by_log_sharpness
+    grad_log_sharpness
 }
 
 #[cfg(test)]
@@ -76,13 +76,13 @@ mod tests {
     use super::*;
 
     const DISTANCES: [f32; 7] = [0.9, 0.4, 0.1, 0.02, -0.05, -0.3, 0.5];
-    const BY_WEIGHTS: [f32; 7] = [0.3, -0.2, 1.0, 0.7, -1.5, 0.4, 2.0];
+    const GRAD_WEIGHTS: [f32; 7] = [0.3, -0.2, 1.0, 0.7, -1.5, 0.4, 2.0];
 
     /// Weighted sum in double precision.
     fn sum(distances: &[f64], sharpness: f64) -> f64 {
         let mut behind = 1.0;
         let mut sum = 0.0;
-        for (s, by) in distances.iter().zip(BY_WEIGHTS) {
+        for (s, by) in distances.iter().zip(GRAD_WEIGHTS) {
             let alpha = 1.0 - (-sharpness / (1.0 + (sharpness * s).exp())).exp();
             sum += behind * alpha * f64::from(by);
             behind *= 1.0 - alpha;
@@ -99,9 +99,10 @@ mod tests {
             fearless_simd::dispatch!(level, simd => opacity(simd, &DISTANCES, sharpness, &mut opacities));
             let total = weigh(&opacities, &mut weights);
             assert!((weights.iter().sum::<f32>() - total).abs() < 1e-6);
-            let weighted: f64 = weights.iter().zip(BY_WEIGHTS).map(|(w, g)| f64::from(w * g)).sum();
+            let weighted: f64 = weights.iter().zip(GRAD_WEIGHTS).map(|(w, g)| f64::from(w * g)).sum();
             assert!((weighted - sum(&exact, 12.0)).abs() < 1e-5);
-            let by_log = weigh_backward(sharpness, &DISTANCES, &opacities, &weights, &BY_WEIGHTS, &mut by);
+            let grad_log =
+                weigh_backward(sharpness, &DISTANCES, &opacities, &weights, &GRAD_WEIGHTS, &mut by);
             for k in 0..7 {
                 let moved = |by: f64| {
                     let mut moved = exact.clone();
@@ -113,7 +114,7 @@ mod tests {
             }
             let at = |log: f64| sum(&exact, 12.0 * log.exp());
             let numeric = (at(1e-5) - at(-1e-5)) / 2e-5;
-            assert!((numeric - f64::from(by_log)).abs() < 2e-4, "{by_log}, not {numeric}");
+            assert!((numeric - f64::from(grad_log)).abs() < 2e-4, "{grad_log}, not {numeric}");
         }
     }
 }

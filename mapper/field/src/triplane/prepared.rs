@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::cells::{PlanesView, Points};
 use super::decode::{Activations, decode};
 use super::decode_backward::{Transposed, decode_backward};
-use super::encode::{by_points, encode};
+use super::encode::{encode, grad_points};
 use super::field::TriplaneField;
 use super::layers::Layers;
 use super::opacity::{Opacity, opacity};
@@ -44,9 +44,9 @@ pub(super) struct FieldSamples<const OUTPUTS: usize> {
     /// Outputs after their activation, padded.
     pub(super) values: Vec<[f32; OUTPUTS]>,
     /// Gradient of the loss by the outputs, padded: by the values first, then before their activation.
-    pub(super) by_outputs: Vec<[f32; OUTPUTS]>,
-    pub(super) by_features: Vec<[f32; FEATURES]>,
-    pub(super) by_points: Vec<[f32; 3]>,
+    pub(super) grad_outputs: Vec<[f32; OUTPUTS]>,
+    pub(super) grad_features: Vec<[f32; FEATURES]>,
+    pub(super) grad_points: Vec<[f32; 3]>,
 }
 
 impl<const OUTPUTS: usize> FieldSamples<OUTPUTS> {
@@ -73,16 +73,16 @@ impl<const OUTPUTS: usize> FieldSamples<OUTPUTS> {
     }
 
     /// Gradients by the features, one per sample.
-    pub(super) fn by_features(&self) -> &[[f32; FEATURES]] {
-        self.by_features.get(..self.len()).unwrap_or_default()
+    pub(super) fn grad_features(&self) -> &[[f32; FEATURES]] {
+        self.grad_features.get(..self.len()).unwrap_or_default()
     }
 
     /// Makes room for gradients, by the values all zero.
     pub(super) fn start_backward(&mut self) {
         let padded = self.activations.features.len();
-        self.by_outputs.clear();
-        self.by_outputs.resize(padded, [0.0; OUTPUTS]);
-        self.by_features.resize(padded, [0.0; FEATURES]);
+        self.grad_outputs.clear();
+        self.grad_outputs.resize(padded, [0.0; OUTPUTS]);
+        self.grad_features.resize(padded, [0.0; FEATURES]);
     }
 }
 
@@ -108,15 +108,23 @@ impl<'a, const OUTPUTS: usize> Head<'a, OUTPUTS> {
         simd: S,
         samples: &mut FieldSamples<OUTPUTS>,
         with_points: bool,
-        by_layers: &mut Layers<OUTPUTS>,
+        grad_layers: &mut Layers<OUTPUTS>,
     ) {
-        let FieldSamples { activations, by_outputs, by_features, .. } = samples;
-        decode_backward(simd, self.layers, &self.transposed, activations, by_outputs, by_features, by_layers);
+        let FieldSamples { activations, grad_outputs, grad_features, .. } = samples;
+        decode_backward(
+            simd,
+            self.layers,
+            &self.transposed,
+            activations,
+            grad_outputs,
+            grad_features,
+            grad_layers,
+        );
         let count = samples.len();
-        samples.by_points.resize(if with_points { count } else { 0 }, [0.0; 3]);
+        samples.grad_points.resize(if with_points { count } else { 0 }, [0.0; 3]);
         if with_points {
             let points = samples.points.each_ref().map(Vec::as_slice);
-            by_points(simd, &self.planes, points, &samples.by_features, &mut samples.by_points);
+            grad_points(simd, &self.planes, points, &samples.grad_features, &mut samples.grad_points);
         }
     }
 }
@@ -154,16 +162,16 @@ impl<'a> Prepared<'a> {
         });
     }
 
-    /// Takes the gradient by signed distances, in `by_outputs`, to weights, features and perhaps points.
+    /// Takes the gradient by signed distances, in `grad_outputs`, to weights, features and perhaps points.
     pub(super) fn distances_backward(
         &self,
         samples: &mut FieldSamples<1>,
         with_points: bool,
-        by_layers: &mut Layers<1>,
+        grad_layers: &mut Layers<1>,
     ) {
-        let outputs = samples.by_outputs.as_flattened_mut().iter_mut();
+        let outputs = samples.grad_outputs.as_flattened_mut().iter_mut();
         outputs.zip(samples.values.as_flattened()).for_each(|(by, value)| *by *= 1.0 - value * value);
-        dispatch!(self.level, simd => self.geometry.backward(simd, samples, with_points, by_layers));
+        dispatch!(self.level, simd => self.geometry.backward(simd, samples, with_points, grad_layers));
     }
 
     /// As [`Self::distances_backward`] for colours.
@@ -171,11 +179,11 @@ impl<'a> Prepared<'a> {
         &self,
         samples: &mut FieldSamples<3>,
         with_points: bool,
-        by_layers: &mut Layers<3>,
+        grad_layers: &mut Layers<3>,
     ) {
-        let outputs = samples.by_outputs.as_flattened_mut().iter_mut();
+        let outputs = samples.grad_outputs.as_flattened_mut().iter_mut();
         outputs.zip(samples.values.as_flattened()).for_each(|(by, value)| *by *= value * (1.0 - value));
-        dispatch!(self.level, simd => self.colour.backward(simd, samples, with_points, by_layers));
+        dispatch!(self.level, simd => self.colour.backward(simd, samples, with_points, grad_layers));
     }
 }
 

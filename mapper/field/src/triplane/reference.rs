@@ -114,18 +114,18 @@ fn gradients(level: Level, field: &TriplaneField, points: &[[f32; 3]]) -> (Field
     geometry.start_backward();
     colours.start_backward();
     for k in 0..points.len() {
-        geometry.by_outputs[k] = [weight(k, 7)];
-        colours.by_outputs[k] = core::array::from_fn(|c| weight(k, c));
+        geometry.grad_outputs[k] = [weight(k, 7)];
+        colours.grad_outputs[k] = core::array::from_fn(|c| weight(k, c));
     }
     let mut sums = FieldGradients::default();
     sums.reset(field);
     prepared.distances_backward(&mut geometry, true, &mut sums.distance_decoder);
     prepared.colours_backward(&mut colours, true, &mut sums.colour_decoder);
     let [of_geometry, of_colour] =
-        [[(geometry.points(), geometry.by_features())], [(colours.points(), colours.by_features())]];
+        [[(geometry.points(), geometry.grad_features())], [(colours.points(), colours.grad_features())]];
     sums.add_planes(&prepared, &of_geometry, &of_colour);
-    let by_points = geometry.by_points.iter().zip(&colours.by_points);
-    (sums, by_points.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] + b[axis])).collect())
+    let grad_points = geometry.grad_points.iter().zip(&colours.grad_points);
+    (sums, grad_points.map(|(a, b)| [0, 1, 2].map(|axis| a[axis] + b[axis])).collect())
 }
 
 #[test]
@@ -155,7 +155,7 @@ fn gradients_are_those_of_finite_differences_at_every_level() {
     let (field, points) = (lively_field(), points(37));
     let exact: Vec<[f64; 3]> = points.iter().map(|point| point.map(f64::from)).collect();
     for level in levels_up_to(Level::new()) {
-        let (mut sums, by_points) = gradients(level, &field, &points);
+        let (mut sums, grad_points) = gradients(level, &field, &points);
         let check = |what: &str, analytic: f32, change: &dyn Fn(&mut TriplaneField, f32)| {
             let moved = |by: f32| {
                 let mut moved = field.clone();
@@ -187,7 +187,7 @@ fn gradients_are_those_of_finite_differences_at_every_level() {
             gradient.clear();
             assert!(gradient.sums.iter().all(|sum| *sum == 0.0), "touched nodes are all there are");
         }
-        for (k, by) in by_points.iter().enumerate() {
+        for (k, by) in grad_points.iter().enumerate() {
             for axis in 0..3 {
                 let moved = |by: f64| {
                     let mut moved = exact.clone();

@@ -92,12 +92,12 @@ impl<S: Simd> Corners<S> {
 
 /// Adds the gradient by the values of plane `plane` of both resolutions, the coarse and the fine one.
 #[inline(always)]
-pub(super) fn by_plane<S: Simd>(
+pub(super) fn sums_of_plane<S: Simd>(
     simd: S,
     levels: &[PlanesView<'_>; 2],
     plane: usize,
     points: Points<'_>,
-    by_features: &[[f32; FEATURES]],
+    grad_features: &[[f32; FEATURES]],
     out: &mut [PlaneSums<'_>; 2],
 ) {
     let columns = levels.each_ref().map(|planes| planes.columns(plane));
@@ -110,7 +110,7 @@ pub(super) fn by_plane<S: Simd>(
             cells.find(simd, planes, points, [plane]);
         }
         cells[1].prefetch(fine.sums, plane, columns[1], points[0].len());
-        let gradients = &by_features[start..start + points[0].len()];
+        let gradients = &grad_features[start..start + points[0].len()];
         for (point, gradient) in gradients.iter().take(TILE).enumerate() {
             let (of_coarse, of_fine) = gradient.split_at(CHANNELS);
             let Cell { start, place } = cells[0].at(point, plane);

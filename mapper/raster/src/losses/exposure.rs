@@ -25,7 +25,7 @@ pub struct ExposureLoss {
     /// The terms.
     pub terms: LossTerms,
     /// Gradient by the parameters of the path.
-    pub by_path: SVector<f64, PATH_PARAMETERS>,
+    pub grad_path: SVector<f64, PATH_PARAMETERS>,
     /// Gradient by the logarithm of the gain.
-    pub by_log_gain: f64,
+    pub grad_log_gain: f64,
 }

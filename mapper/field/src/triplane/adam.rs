@@ -114,6 +114,9 @@ impl TriplaneAdam {
     /// Moves `field` one step against `gradients`, and leaves the gradients by its planes zero. Features that were not
     /// seen rest, and so do their moments. There is no correction for young moments: with these decays the first steps
     /// of a feature have once to twice their length, which is welcome.
+    ///
+    /// # Panics
+    /// If the gradients are those of a field of another size.
     pub fn step(
         &mut self,
         level: Level,
@@ -132,9 +135,13 @@ impl TriplaneAdam {
         let planes: Vec<_> =
             plane_values_mut(field).into_iter().zip(moments).zip(&mut gradients.planes).collect();
         planes.into_par_iter().for_each(|((values, (first, second)), gradient)| {
-            if [gradient.sums.len(), first.len(), second.len()] == [values.len(); 3] {
-                dispatch!(level, simd => step_plane(simd, values, [first, second], gradient, step.planes));
-            }
+            assert!(
+                [gradient.sums.len(), first.len(), second.len()] == [values.len(); 3],
+                "the gradients of a plane of {} values cannot move one of {}",
+                gradient.sums.len(),
+                values.len()
+            );
+            dispatch!(level, simd => step_plane(simd, values, [first, second], gradient, step.planes));
             gradient.clear();
         });
     }
@@ -193,4 +200,21 @@ fn step_plane<S: Simd>(
             }
         },
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::triplane::FieldSettings;
+
+    #[test]
+    #[should_panic(expected = "cannot move one of")]
+    fn gradients_of_a_smaller_field_are_refused() {
+        let small = Region::around([0.0; 3], [0.1; 3]);
+        let mut field = TriplaneField::new(small, FieldSettings::default(), 1);
+        let mut gradients = FieldGradients::default();
+        gradients.reset(&field);
+        field.grow(&Region::around([0.0; 3], [2.0; 3]));
+        TriplaneAdam::default().step(Level::new(), &mut field, &mut gradients, FieldStep::default());
+    }
 }

@@ -127,7 +127,8 @@ impl ExposureRenderer {
     /// [`GaussianGradients::screen`] gets the sum over the virtual views of the lengths of their gradients: the
     /// share of every view in the image is already in them, so that it compares for any number of views.
     ///
-    /// Gaussians and images of other sizes than in that call give no gradient.
+    /// # Panics
+    /// If there was no such call, or Gaussians, image or gradients have other sizes than in it.
     pub fn backward(
         &self,
         gaussians: &Gaussians,
@@ -138,9 +139,11 @@ impl ExposureRenderer {
         let ExposureScratch { rasters, poses, row_weights, colour_views, pose_sums, .. } = scratch;
         let views = poses.len();
         let rasters = &mut rasters[..views];
-        if views == 0 || !rasters.iter().all(|raster| raster.fits(gaussians, by_image, gradients)) {
-            return SVector::zeros();
-        }
+        assert!(views > 0, "backward is for an exposure, and none was rendered before");
+        assert!(
+            rasters.iter().all(|raster| raster.fits(gaussians, by_image, gradients)),
+            "backward is for the Gaussians and the size of the exposure that was rendered before"
+        );
         rasters.par_iter_mut().enumerate().for_each(|(k, raster)| {
             let share = match row_weights.get(k) {
                 None => ViewShare { colour: ColourShare::Same(1.0 / views as f32), geometry: k == views / 2 },

@@ -101,12 +101,13 @@ impl Gaussians {
         (index < self.len()).then(|| Gaussian::from_array(core::array::from_fn(|k| self.planes[k][index])))
     }
 
-    /// Replaces Gaussian `index`; nothing happens if there are fewer.
+    /// Replaces Gaussian `index`.
+    ///
+    /// # Panics
+    /// If there are fewer.
     pub fn set(&mut self, index: usize, gaussian: &Gaussian) {
         for (plane, value) in self.planes.iter_mut().zip(gaussian.to_array()) {
-            if let Some(element) = plane.get_mut(index) {
-                *element = value;
-            }
+            plane[index] = value;
         }
     }
 

@@ -180,7 +180,8 @@ impl Rasterizer {
     /// by the pose. `by_image` is the gradient by the image of the last call of [`Self::forward`], which had the
     /// same Gaussians and the same scratch memory.
     ///
-    /// Gaussians and images of other sizes than in that call give no gradient.
+    /// # Panics
+    /// If Gaussians, image or gradients have other sizes than in that call.
     pub fn backward(
         &self,
         gaussians: &Gaussians,
@@ -188,9 +189,10 @@ impl Rasterizer {
         scratch: &mut RasterScratch,
         gradients: &mut GaussianGradients,
     ) -> ViewGradient {
-        if !scratch.fits(gaussians, by_image, gradients) {
-            return ViewGradient::default();
-        }
+        assert!(
+            scratch.fits(gaussians, by_image, gradients),
+            "backward is for the Gaussians and the size of the view that was rendered before"
+        );
         self.replay(by_image, scratch);
         self.project_backward(gaussians, scratch, gradients)
     }

@@ -40,8 +40,10 @@ impl Ssim {
     /// a Gaussian of 11x11 pixels with a standard deviation of 1.5, the constants are 0.01 and 0.03, as in the
     /// paper. The memory is kept for the next image of that size. Results do not depend on the number of threads.
     ///
-    /// An image of which a side is below 11 pixels has no window: the result is 1 and nothing is added. So it is
-    /// if a plane has another length than `size` says.
+    /// An image of which a side is below 11 pixels has no window: the result is 1 and nothing is added.
+    ///
+    /// # Panics
+    /// If a plane has another length than `size` says.
     pub fn add_gradient(
         &mut self,
         size: [usize; 2],
@@ -51,10 +53,14 @@ impl Ssim {
         gradient: [&mut [f32]; 3],
     ) -> f64 {
         let [width, height] = size;
-        let fits = |length: usize| width.checked_mul(height) == Some(length);
-        let planes_fit = reference.iter().chain(&estimate).all(|plane| fits(plane.len()));
-        if width < WINDOW || height < WINDOW || !planes_fit || !gradient.iter().all(|plane| fits(plane.len()))
-        {
+        let given = reference.iter().chain(&estimate).map(|plane| plane.len());
+        for length in given.chain(gradient.iter().map(|plane| plane.len())) {
+            assert!(
+                width.checked_mul(height) == Some(length),
+                "a plane of {length} values is no image of {width} x {height} pixels"
+            );
+        }
+        if width < WINDOW || height < WINDOW {
             return 1.0;
         }
         let windows = (width - 2 * RADIUS) * (height - 2 * RADIUS);

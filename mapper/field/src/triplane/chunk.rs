@@ -16,6 +16,10 @@ use super::ray_views::RayViews;
 use super::sampling::{MidDepth, Motion, NEAREST, SamplingSettings, stratified};
 use super::weights::FieldWeights;
 
+/// A sixth of the band, which reaches 1.5 truncations to both sides, lies more than one truncation in front of the surface
+/// and counts as free space.
+const BAND_PER_FRONT: usize = 6;
+
 /// Pixels per chunk: what belongs to one stays in the cache of a core.
 pub(super) const CHUNK: usize = 32;
 
@@ -140,6 +144,7 @@ impl Chunk {
         let mut below = |bound: usize| ((u64::from(random.next_u32()) * bound as u64) >> 32) as usize;
         self.pixels.clear();
         for _ in 0..count {
+            // Only where the sensor has pixels: outside of the region there is nothing to compare with.
             let u = region.left + below(region.right - region.left);
             let v = region.top + below(region.bottom - region.top);
             let index = v * camera.width + u;
@@ -154,6 +159,7 @@ impl Chunk {
     /// Looks in the field for the surfaces of pixels without a measured depth.
     fn find_surfaces(&mut self, job: &Job<'_>) {
         let unknown = self.pixels.iter_mut().filter(|pixel| pixel.surface.is_none());
+        // From the view at the time of the depth image, up to where the ray leaves the box.
         let seen = |pixel: &mut Pixel| {
             let view = &job.views[pixel.first_view + job.rays.of_depth];
             within_box(job, view, ray(view, pixel.slope))
@@ -178,17 +184,21 @@ impl Chunk {
                 let (start, z) = (self.z.len(), &mut self.z);
                 let ray = ray(view, pixel.slope);
                 match pixel.surface {
+                    // Depth was measured in this very view: samples in front of the surface and densely around it.
                     Some(depth) if pixel.measured > 0.0 && number == of_depth => {
                         job.sampling.measured(random, depth, truncation, z);
                     }
+                    // No measurement, but the field has a surface here.
                     Some(surface) if number == of_depth => {
                         job.sampling.expected(random, [surface; 2], truncation, z);
                     }
                     Some(surface) => {
+                        // Another view sees another point: the depth image is asked what that is.
                         let surfaces = depth.guess(&view.mid_from_camera, pixel.slope, surface);
                         job.sampling.expected(random, surfaces, truncation, z);
                     }
                     None => {
+                        // Nothing is known of this ray: the whole of it is sampled.
                         stratified(random, within_box(job, view, ray).range, job.sampling.open, z);
                     }
                 }
@@ -208,12 +218,14 @@ impl Chunk {
         self.depth.clear();
         for ray in &self.rays {
             let range = ray.start..ray.end;
+            // The weight of a sample is its opacity times the transmittance in front of it.
             weigh(&self.opacities[range.clone()], &mut self.weights[range.clone()]);
             let samples = self.weights[range.clone()].iter().zip(&self.z[range]);
             self.depth.push(samples.map(|(weight, z)| weight * z).sum());
         }
         self.lit.clear();
         self.colour.clear();
+        // Colours are decoded only where they would be seen; most samples have hardly any weight.
         let least = job.sampling.least_weight;
         for (sample, _) in self.weights.iter().enumerate().filter(|(_, weight)| **weight > least) {
             self.lit.push(sample as u32);
@@ -246,12 +258,14 @@ impl Chunk {
         let mut grad_light = Vec::with_capacity(self.rays.len());
         for k in 0..self.pixels.len() {
             let grad_pixel = self.compare_colour(job, k);
+            // Colour is the mean over the views of light; the other views, those of depth, have no part in it.
             grad_light.extend((0..of_light).map(|_| grad_pixel.map(|by| by / of_light as f32)));
             grad_light.extend((of_light..per_pixel).map(|_| [0.0; 3]));
             if self.pixels[k].measured > 0.0 {
                 self.compare_depth(job, k, k * per_pixel + of_depth);
             }
         }
+        // Back through the stages of the forward pass: colours, weights, distances, and last the poses.
         self.colours_backward(job, &grad_light);
         for ray in &self.rays {
             let range = ray.start..ray.end;
@@ -275,6 +289,7 @@ impl Chunk {
         let RayViews { per_pixel, of_light: views, .. } = job.rays;
         let rays = &self.light[k * per_pixel..k * per_pixel + views];
         let index = self.pixels[k].index;
+        // What the lens takes away is part of the gain, so that the map has the light before the lens.
         let gain = job.seen.falloff.as_ref().map_or(job.gain, |falloff| job.gain * falloff[index]);
         let share = 1.0 / (3 * job.pixels) as f32;
         core::array::from_fn(|channel| {
@@ -282,6 +297,7 @@ impl Chunk {
             let byte = job.seen.colour[channel][index];
             let target = f32::from(byte) * (1.0 / 255.0);
             let [value, slope] = job.curve.at(gain * light);
+            // A clipped value says that there was at least so much light, no more.
             if byte >= CLIPPED && value > target {
                 return 0.0;
             }
@@ -300,16 +316,20 @@ impl Chunk {
         let (measured, weights) = (self.pixels[k].measured, &job.weights);
         let truncation = job.field.field.settings.truncation;
         let per_pixel = 1.0 / job.pixels as f32;
+        // Rendered depth.
         let off = self.depth[ray] - measured;
         self.sums.depth += weights.depth * per_pixel * off * off;
         let grad_depth = 2.0 * weights.depth * per_pixel * off;
-        let front =
-            per_pixel * weights.free_space / (job.sampling.front + job.sampling.band / 6).max(1) as f32;
+        // Means over samples: those of free space are in front of the band and in its foremost part.
+        let front = per_pixel * weights.free_space
+            / (job.sampling.front + job.sampling.band / BAND_PER_FRONT).max(1) as f32;
         let band = per_pixel / job.sampling.band.max(1) as f32;
         for sample in self.rays[ray].start..self.rays[ray].end {
             let (z, s) = (self.z[sample], self.geometry.values[sample][0]);
             self.grad_weights[sample] += grad_depth * z;
+            // Distance in front of the measured surface in truncations, which the field should have at the sample.
             let ahead = (measured - z) / truncation;
+            // Farther than a truncation in front it is 1. Behind the band nothing is known.
             let (loss, by) = if ahead > 1.0 {
                 (front * (s - 1.0) * (s - 1.0), 2.0 * front * (s - 1.0))
             } else if ahead >= -1.0 {
@@ -346,6 +366,7 @@ impl Chunk {
             sum.iter_mut().zip(by).for_each(|(sum, by)| *sum += by);
         }
         for ray in &self.rays {
+            // Of all samples of a ray: the sum of the gradients, and the sum of depth times gradient.
             let (mut shift, mut lever) = ([0.0; 3], [0.0; 3]);
             for sample in ray.start..ray.end {
                 for (axis, by) in self.geometry.grad_points[sample].iter().enumerate() {
@@ -353,6 +374,7 @@ impl Chunk {
                     lever[axis] += by * self.z[sample];
                 }
             }
+            // In the camera a sample is its depth times (slope, 1), so that one cross product does for the whole ray.
             let lever = job.views[ray.view].field_from_camera.turn_back(lever).map(f64::from);
             let slope = self.pixels[ray.pixel].slope.map(f64::from);
             let turn = Vector3::new(slope[0], slope[1], 1.0).cross(&Vector3::from(lever));

@@ -55,8 +55,10 @@ pub(super) fn decode_backward<S: Simd, const OUTPUTS: usize>(
     while start < grad_outputs.len() {
         let range = start..(start + TILE).min(grad_outputs.len());
         let count = range.len();
+        // Gradients of a tile go from the outputs to the features and stay in the first cache on the way.
         let hidden = samples.hidden.each_ref().map(|layer| &layer[range.clone()]);
         let grad_outputs = &grad_outputs[range.clone()];
+        // Through the layers, the last one first.
         last_layer(simd, layers, hidden[1], grad_outputs, &mut tile.second, grad_layers);
         through(simd, &transposed.second, hidden[0], &tile.second, &mut tile.first);
         to_features(simd, transposed, &tile.first, &mut grad_features[range.clone()]);
@@ -67,6 +69,7 @@ pub(super) fn decode_backward<S: Simd, const OUTPUTS: usize>(
             &mut grad_layers.second,
             &mut grad_layers.second_bias,
         );
+        // The weights of a layer get the products of its inputs with the gradient by its sums.
         let features = &samples.features[range];
         grad_weights(
             simd,
@@ -97,8 +100,10 @@ fn last_layer<S: Simd, const OUTPUTS: usize>(
             let hidden = f32x16::load_array_ref(simd, hidden);
             sum = hidden.mul_add(grad_outputs[output], sum);
             grad_layers.last_bias[output] += grad_outputs[output];
+            // The first output overwrites what an earlier tile left.
             let before = if output == 0 { zero } else { f32x16::load_array_ref(simd, out) };
             let grad_hidden = row.mul_add(grad_outputs[output], before);
+            // The derivative of max(0, x): what was off passes nothing on.
             hidden.simd_gt(0.0).select(grad_hidden, zero).store_array(out);
         }
         sum.store_array(&mut grad_layers.last[output]);
@@ -119,6 +124,7 @@ fn through<S: Simd>(
     for (hidden, (grad_sums, out)) in hidden.as_chunks::<BLOCK>().0.iter().zip(blocks) {
         let products = multiply(simd, rows, zero, grad_sums);
         for ((product, hidden), out) in products.into_iter().zip(hidden).zip(out) {
+            // As above, what was off passes nothing on.
             let active = f32x16::load_array_ref(simd, hidden).simd_gt(0.0);
             active.select(product, zero).store_array(out);
         }
@@ -153,6 +159,7 @@ fn grad_weights<S: Simd, const INPUTS: usize>(
     out: &mut [Units; INPUTS],
     grad_bias: &mut Units,
 ) {
+    // The bias has an input of one.
     let mut bias = f32x16::load_array_ref(simd, grad_bias);
     for grad_sums in grad_sums {
         bias += f32x16::load_array_ref(simd, grad_sums);

@@ -87,6 +87,7 @@ pub(super) fn grad_points<S: Simd>(
 ) {
     let mut cells = [Cells::NONE; 2];
     let planes = &levels[0];
+    // Both resolutions end at the same place.
     let end = planes.nodes.map(|nodes| (nodes - 1) as f32 / planes.cells_per_metre);
     for start in (0..points[0].len()).step_by(TILE) {
         let points = tile(points, start);
@@ -101,6 +102,7 @@ pub(super) fn grad_points<S: Simd>(
             }
             for axis in 0..3 {
                 let x = points[axis][point];
+                // At and beyond the border coordinates are clamped, which has no slope.
                 let inside = x > 0.0 && x < end[axis];
                 out[axis] = if inside { sums[axis].reduce_sum() } else { 0.0 };
             }
@@ -125,6 +127,7 @@ fn add_by_place<S: Simd>(
             [row(simd, values, start), row(simd, values, start + planes.columns(plane) * CHANNELS)];
         for (k, gradient) in grad_features.as_chunks::<LANES>().0.iter().enumerate() {
             let gradient = f32x8::load_array_ref(simd, gradient) * planes.cells_per_metre;
+            // The slope of a bilinear patch along one axis, linear along the other.
             let [along_near, along_far] = [near[1][k] - near[0][k], far[1][k] - far[0][k]];
             let along = (along_far - along_near).mul_add(v, along_near);
             let [across_near, across_far] = [far[0][k] - near[0][k], far[1][k] - near[1][k]];

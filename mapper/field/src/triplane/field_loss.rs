@@ -16,6 +16,9 @@ use super::ray_views::RayViews;
 use super::sampling::{Motion, SamplingSettings};
 use super::weights::FieldWeights;
 
+/// Streams of random numbers that a step may use, one per chunk: far more than chunks of any picture.
+const STREAMS_PER_STEP: u64 = 1 << 20;
+
 /// How one exposure is compared with a field.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldExposure<'a> {
@@ -67,10 +70,12 @@ impl FieldLoss {
         let Exposure { seen, path, gain, views } = given.exposure;
         let empty = seen.region.left >= seen.region.right || seen.region.top >= seen.region.bottom;
         let pixels = if empty { 0 } else { given.pixels };
+        // 1. The field as kernels want it, and the virtual views that pixels are seen in.
         let prepared = Prepared::new(self.level, field);
         let rays = RayViews::new(&seen.times, views, seen.camera.height);
         let times = rays.times(&seen.times);
         let views = virtual_views(&prepared, path, &times, &rays);
+        // 2. Pixels in chunks, each with random numbers of its own, so that it does not matter which thread has which chunk.
         let count = pixels.div_ceil(CHUNK);
         let job = Job {
             field: &prepared,
@@ -83,7 +88,7 @@ impl FieldLoss {
             sampling: given.sampling,
             with_path: given.with_path,
             seed: given.seed,
-            stream: given.step.wrapping_mul(1 << 20),
+            stream: given.step.wrapping_mul(STREAMS_PER_STEP),
             pixels,
         };
         if self.chunks.len() < count {
@@ -91,6 +96,7 @@ impl FieldLoss {
         }
         let chunks = &mut self.chunks[..count];
         chunks.par_iter_mut().enumerate().for_each(|(index, chunk)| chunk.run(&job, index));
+        // 3. Gradients by the planes, plane by plane: a node gets its samples in their order, whoever adds them.
         let groups: Vec<[Group<'_>; 2]> = chunks.iter().map(Chunk::groups).collect();
         let [geometry, colour] = [0, 1].map(|kind| groups.iter().map(|pair| pair[kind]).collect::<Vec<_>>());
         self.gradients.reset(field);
@@ -104,6 +110,7 @@ impl FieldLoss {
         let mut grad_path = SVector::<f64, PATH_PARAMETERS>::zeros();
         let mut grad_log_gain = 0.0;
         let jacobians: Vec<_> = times.iter().map(|time| path.pose_jacobian(*time).transpose()).collect();
+        // A gradient by the pose of a view becomes one by the path through the derivative of the pose at the time of the view.
         for Chunk { sums, .. } in &self.chunks[..count] {
             terms.colour += f64::from(sums.colour);
             terms.depth += f64::from(sums.depth);

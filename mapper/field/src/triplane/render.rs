@@ -50,6 +50,7 @@ impl FieldRenderer {
         world_from_camera: &RigidTransform,
     ) -> RasterImage {
         let prepared = Prepared::new(self.level, field);
+        // Kernels have the lowest corner of the box as their origin: single precision is best near zero.
         let mut field_from_camera = *world_from_camera;
         field_from_camera.translation -= prepared.origin;
         let motion = Motion::new(&field_from_camera);
@@ -57,6 +58,7 @@ impl FieldRenderer {
             let slope = camera.ray(u as f64, v as f64).map(|x| x as f32);
             let direction = motion.turn(slope.into());
             let along = Vector3::from(direction.map(f64::from));
+            // Beyond the box the field is not defined.
             let exit = field.region.exit(&world_from_camera.translation, &along) as f32;
             Ray { origin: motion.translation, direction, range: [NEAREST, exit] }
         };
@@ -82,6 +84,7 @@ impl FieldRenderer {
         let reach = self.sampling.surface_reach * field.field.settings.truncation;
         geometry.clear();
         z.clear();
+        // 1. A few samples, evenly around where a ray meets the surface; rays that meet none have none.
         for (ray, surface) in rays.iter().zip(&surfaces) {
             let Some(surface) = surface else { continue };
             for k in 0..count {
@@ -90,11 +93,13 @@ impl FieldRenderer {
                 geometry.push(ray.at(depth));
             }
         }
+        // 2. Distances, opacities and colours of all samples of the row at once.
         field.distances(geometry);
         field.opacities(geometry, opacities);
         colour.clear();
         (0..z.len()).for_each(|sample| colour.push(geometry.points.each_ref().map(|axis| axis[sample])));
         field.colours(colour);
+        // 3. The samples of each ray, weighted.
         weights.resize(count, 0.0);
         let mut start = 0;
         let mut seen = |surface: &Option<f32>| -> Seen {

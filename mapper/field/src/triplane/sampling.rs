@@ -64,6 +64,7 @@ impl SamplingSettings {
         let reach = self.surface_reach * truncation;
         let around = |depth: f32| [(depth - reach).max(NEAREST), depth + reach];
         let [near, far] = surfaces.map(around);
+        // The two ranges overlap and are one; else each gets its half of the samples.
         if far[0] <= near[1] {
             stratified(random, [near[0], far[1]], self.surface, out);
         } else {
@@ -139,6 +140,7 @@ impl<'a> MidDepth<'a> {
             let measured = if x[2] > NEAREST { self.at(x) } else { None };
             measured.map_or(z, |measured| (z + (measured - x[2]) * per_forward).max(2.0 * NEAREST))
         };
+        // Two steps reach a surface that is smooth; one more shows whether they have come to rest.
         let second = next(next(start));
         let third = next(second);
         [second.min(third), second.max(third)]

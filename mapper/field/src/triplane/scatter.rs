@@ -109,11 +109,13 @@ pub(super) fn sums_of_plane<S: Simd>(
         for (cells, planes) in cells.iter_mut().zip(levels) {
             cells.find(simd, planes, points, [plane]);
         }
+        // The coarse plane fits into a cache, the fine one does not.
         cells[1].prefetch(fine.sums, plane, columns[1], points[0].len());
         let gradients = &grad_features[start..start + points[0].len()];
         for (point, gradient) in gradients.iter().take(TILE).enumerate() {
             let (of_coarse, of_fine) = gradient.split_at(CHANNELS);
             let Cell { start, place } = cells[0].at(point, plane);
+            // Samples of a ray mostly stay in one coarse cell: its corners are kept in registers until they leave it.
             if start != corners.start {
                 corners.store(simd, columns[0], coarse);
                 corners = Corners::at(simd, start);

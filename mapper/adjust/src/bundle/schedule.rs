@@ -106,9 +106,14 @@ const DENSITY_UNTIL: f64 = 0.6;
 /// Visits from which the path of a keyframe moves while the map grows.
 const SETTLED: u32 = 6;
 
+/// Step lengths of Gaussians at the beginning, in the units of [`StepLengths`]: a centre moves by a twentieth of the size of its
+/// Gaussian.
 const LENGTHS: StepLengths =
     StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
+/// First step length of the logarithm of a gain: a fifth of a percent, half a step of 8 bits in bright light.
 const LOG_GAIN: f64 = 2e-3;
+/// Weights of the terms of the loss of Gaussians. Colour is the unit, and similarity counts a fifth, as in 3DGS. An error of
+/// inverse depth of 0.01/m counts as 0.02 of full scale. Alpha only keeps surfaces from fading.
 const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, alpha: 0.01 };
 
 impl Schedule {
@@ -125,8 +130,11 @@ impl Schedule {
     #[must_use]
     pub fn new(keyframes: usize) -> Self {
         let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
+        // At half resolution a step costs a quarter: the map takes shape there. Few keyframes still need so many steps.
         let coarse = Stage { steps: visits(8, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 9 };
+        // Most of the time goes into details. Views 4 pixels apart along the blur are enough while steps are long.
         let fine = Stage { steps: visits(18, 600), time_share: 0.65, level: 0, spacing: 4.0, max_views: 11 };
+        // At last views are closer, so that what they leave out between them is not learnt as an edge.
         let last = Stage { steps: visits(4, 100), time_share: 0.25, level: 0, spacing: 3.0, max_views: 21 };
         Self { stages: vec![coarse, fine, last], pace: WHOLE }
     }
@@ -135,6 +143,7 @@ impl Schedule {
     #[must_use]
     pub fn field(keyframes: usize) -> Self {
         let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
+        // As for Gaussians; a step is a few thousand pixels, so there are three times as many.
         let coarse = Stage { steps: visits(15, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 5 };
         let fine = Stage { steps: visits(60, 1200), time_share: 0.6, level: 0, spacing: 5.0, max_views: 9 };
         let last = Stage { steps: visits(25, 500), time_share: 0.3, level: 0, spacing: 4.0, max_views: 15 };
@@ -144,6 +153,7 @@ impl Schedule {
     /// The schedule of `steps` steps that finishes a map which has grown frame by frame.
     #[must_use]
     pub fn finish(steps: usize) -> Self {
+        // The map has its coarse shape. Four fifths of the steps are for details, the rest with closer views.
         let last = steps / 5;
         let fine = Stage { steps: steps - last, time_share: 0.8, level: 0, spacing: 6.0, max_views: 11 };
         let last = Stage { steps: last, time_share: 0.2, level: 0, spacing: 4.0, max_views: 11 };
@@ -197,6 +207,7 @@ impl Schedule {
     pub fn plan(&self, position: f64, timed: bool) -> StepPlan {
         let stage = self.stages[self.stage(position, timed)];
         let Pace { hold, final_length, paths_from, path_pixels, only_motions, .. } = self.pace;
+        // From its first to its last length a step shrinks by the same factor in equal parts of the schedule.
         let shrink = final_length.powf((position - hold).max(0.0) / (1.0 - hold));
         let paths = if position < paths_from { 0.0 } else { shrink };
         StepPlan {
@@ -216,6 +227,7 @@ impl Schedule {
     #[must_use]
     pub fn density_changes(&self, before: f64, after: f64) -> bool {
         let changes = self.pace.density_changes;
+        // Changes are evenly spaced up to where the density is final.
         let count = |position: f64| (position.min(DENSITY_UNTIL) * changes / DENSITY_UNTIL).floor();
         count(after) > count(before)
     }

@@ -25,9 +25,11 @@ pub(super) fn reversed_exposures(measured: &[Measured], evidence: f64) -> Vec<bo
     let mut costs = vec![[0.0, measured.first().map_or(evidence, prior_of_swap)]];
     let mut before = vec![[false; 2]];
     for (k, pair) in measured.windows(2).enumerate() {
+        // Of both ends of the pair, the larger acceleration is what to expect in between.
         let usual = [0, 1].map(|part| accelerations[part][k].max(accelerations[part][k + 1]));
         let [forward, backward] = costs[k];
         let of_pair = pair_costs(pair, usual);
+        // For each direction of the second frame, the cheaper of both directions of the first.
         let step = [false, true].map(|direction| {
             let [after_forward, after_backward] = of_pair[usize::from(direction)];
             let (from_forward, from_backward) = (forward + after_forward, backward + after_backward);
@@ -66,6 +68,7 @@ fn pair_energy(pair: &[Measured], reversed: [bool; 2], usual_accelerations: [f64
     let [a, b] = [&pair[0], &pair[1]];
     let seconds = b.timestamp - a.timestamp;
     let cost = |part: Part, acceleration: f64| {
+        // Mean velocity between the middles, from which both exposures differ by what accelerates them.
         let middle = part.step(&a.exposure.mid(), &b.exposure.mid()) / seconds;
         let excess = |frame: &Measured, reversed| {
             if frame.has_velocity() { frame.velocity(part, reversed) - middle } else { Vector3::zeros() }

@@ -77,6 +77,7 @@ impl<'a> State<'a> {
     /// Solves for both halves of the poses and returns the largest rotation increment.
     fn solve(&mut self) -> Result<f64, String> {
         let problems = Part::BOTH.map(|part| self.problem(part));
+        // The two halves share nothing within a round.
         let (translation, rotation) = rayon::join(|| problems[0].solve(), || problems[1].solve());
         self.path.advance(Part::Translation, &translation?);
         Ok(self.path.advance(Part::Rotation, &rotation?))
@@ -104,6 +105,7 @@ impl<'a> State<'a> {
     }
 
     fn observations(&self, part: Part) -> Vec<Observation> {
+        // Outliers have no say in the path.
         let agreeing = self.measured.iter().zip(&self.judgements).filter(|(_, judgement)| !judgement.outlier);
         agreeing
             .map(|(frame, judgement)| Observation {
@@ -127,9 +129,11 @@ impl<'a> State<'a> {
         let jerks = &self.jerks[part as usize];
         (0..knots.count - 3)
             .map(|k| {
+                // A third difference spans four control points; in the middle of them it stands for the jerk.
                 let middle = 0.5 * (knots.time(k + 1) + knots.time(k + 2));
                 let after = self.measured.partition_point(|frame| frame.timestamp < middle);
                 let near = after.min(jerks.len() - 1);
+                // Of the frames before and after, the rougher one decides: a jolt may have been between them.
                 jerks[near].max(jerks[near.saturating_sub(1)]) * knots.step.powi(3)
             })
             .collect()
@@ -138,6 +142,7 @@ impl<'a> State<'a> {
     /// Turns the frames in their place that the current path shows the other way round; whether there are any.
     fn review_directions(&mut self) -> bool {
         let tolerances = Part::BOTH.map(|part| self.tolerance_factor(part));
+        // 1. What each frame costs in its direction and in the other one, in units of what residuals are like here.
         let cost = |frame: &Measured, judgement: Judgement| -> f64 {
             let squared = |part: Part| {
                 let tolerance = tolerances[part as usize] * frame.noise_of(part);
@@ -155,6 +160,7 @@ impl<'a> State<'a> {
             let unusual = (cost_there / USUAL_ENERGY).max(1.0);
             (cost_here - cost_there) / unusual > self.settings.swap_evidence
         };
+        // 2. All are turned at once: the path is that of before, whichever of them is wrong.
         let wrong: Vec<bool> = self.measured.iter().zip(&self.judgements).map(wrong).collect();
         for (judgement, &wrong) in self.judgements.iter_mut().zip(&wrong) {
             judgement.reversed ^= wrong;

@@ -96,6 +96,7 @@ impl Problem {
         let controls = self.controls();
         let mut program =
             Program::new(3 * controls, self.observations.len() + self.bending.len(), self.huber);
+        // 1. One Huber term per exposure: both of its meeting points, in standard deviations.
         for observation in &self.observations {
             program.add_huber(|rows| {
                 for (support, residual) in observation.supports.iter().zip(&observation.residuals) {
@@ -104,10 +105,12 @@ impl Problem {
                 }
             });
         }
+        // 2. One per third difference, so that a jolt bends the path in one place instead of in all of its neighbours.
         for (k, (third, sigma)) in self.thirds().iter().zip(&self.bending).enumerate() {
             let weights = THIRD_DIFFERENCE.map(|c| -c * unit / sigma);
             program.add_huber(|rows| rows.add(k, &weights, &(third / *sigma)));
         }
+        // 3. Limits of acceleration and jerk as cones, of which only those are given that a path without them would break.
         for (chosen, current, stencil, limit) in [
             (&limits.second, self.seconds(), &SECOND_DIFFERENCE[..], self.max_second),
             (&limits.third, self.thirds(), &THIRD_DIFFERENCE[..], self.max_third),
@@ -121,6 +124,7 @@ impl Problem {
 
     /// The limits that the path breaks after these increments.
     fn broken(&self, increments: &[Vector3<f64>]) -> Limits {
+        // Differences of what the increments make of the steps.
         let moved = increments.windows(2).zip(&self.steps).map(|(pair, step)| step + pair[1] - pair[0]);
         let after = Self { steps: moved.collect(), ..self.without_observations() };
         let beyond = |differences: Vec<Vector3<f64>>, limit: f64| {

@@ -101,13 +101,16 @@ pub fn repair_by_evidence(
     validate(frames)?;
     let mut held = vec![Held::default(); frames.len()];
     loop {
+        // 1. What continuity says, with those in their place that evidence has put there.
         let result = repair_others(frames, &held, settings)?;
         let suspects: Vec<usize> = (0..frames.len()).filter(|&k| result.contradicts_measurement(k)).collect();
+        // 2. Frames that it contradicts are asked for their pictures. No answer depends on another.
         let found = suspects.par_iter().map(|&k| (k, result.held_by(frames, k, evidence)));
         let found: Vec<(usize, Held)> = found.filter(|(_, held)| *held != Held::default()).collect();
         if found.is_empty() {
             return Ok(result);
         }
+        // 3. Who is held is never let go, so that this ends.
         for (k, more) in found {
             held[k].place |= more.place;
             held[k].direction |= more.direction;
@@ -132,6 +135,7 @@ fn repair_others(
     };
     let Some(interval) = usual_interval(frames) else { return Ok(result) };
     for piece in pieces(frames, settings.longest_gap * interval) {
+        // Lost frames have measured nothing; they are bridged by the path of the others.
         let pairs = frames[piece.clone()].iter().zip(&held[piece.clone()]);
         let measured: Vec<Measured> = pairs.filter_map(|(frame, held)| measured(frame, *held)).collect();
         if measured.len() < FEWEST_FRAMES {
@@ -173,6 +177,7 @@ impl Continuity {
     /// The nearest frames to either side of `k` that stay in their place, nearest first.
     fn references(&self, frames: &[ContinuityFrame], k: usize) -> Vec<(usize, ExposureTrajectory)> {
         let in_place = |l: &usize| matches!(self.verdicts[*l], FrameVerdict::Kept | FrameVerdict::Reversed);
+        // A replaced or bridged frame shows nothing that another could be compared with.
         let before = (0..k).rev().filter(in_place).take(REFERENCES_PER_SIDE);
         let after = (k + 1..frames.len()).filter(in_place).take(REFERENCES_PER_SIDE);
         let mut references: Vec<usize> = before.chain(after).collect();
@@ -184,6 +189,7 @@ impl Continuity {
         self.energy.add(fit);
         let mut judgements = fit.judgements.iter();
         for k in piece {
+            // Only tracked frames have a judgement, in their order.
             let judgement = frames[k].noise.and_then(|_| judgements.next());
             self.verdicts[k] = match judgement {
                 None => FrameVerdict::Bridged,

@@ -24,6 +24,7 @@ const SMALL: f64 = 1e-6;
 #[must_use]
 pub fn refine_by_icp(reference: &[[f32; 3]], estimate: &[[f32; 3]], reach: f64) -> RigidTransform {
     let tree = KdTree::new(reference);
+    // Every so many points: a rigid motion is well determined by some thousands.
     let step = estimate.len().div_ceil(POINTS).max(1);
     let points: Vec<Vector3<f64>> =
         estimate.iter().step_by(step).map(|point| Vector3::from(point.map(f64::from))).collect();
@@ -31,16 +32,19 @@ pub fn refine_by_icp(reference: &[[f32; 3]], estimate: &[[f32; 3]], reach: f64) 
     for _ in 0..STEPS {
         let pair = |point: &Vector3<f64>| {
             let moved = reference_from_estimate.transform_point(point);
+            // 1. Where the point is by now, and its nearest neighbour within reach.
             let query = [moved.x, moved.y, moved.z].map(|coordinate| coordinate as f32);
             let nearest = tree.nearest(&query).filter(|nearest| distance(&query, nearest) <= reach)?;
             Some((Vector3::from(nearest.map(f64::from)), *point))
         };
         let pairs: Vec<Option<_>> = points.par_iter().map(pair).collect();
         let (targets, sources): (Vec<_>, Vec<_>) = pairs.into_iter().flatten().unzip();
+        // 2. The motion that takes all points to their neighbours at once, from where they started.
         let Ok(found) = align(&targets, &sources, Alignment::Se3) else { break };
         let next = RigidTransform { rotation: found.rotation, translation: found.translation };
         let moved = reference_from_estimate.tangent_to(&next).norm();
         reference_from_estimate = next;
+        // 3. Neighbours do not change any more once the motion does not.
         if moved < SMALL {
             break;
         }

@@ -50,6 +50,7 @@ pub fn evaluate_mesh_depth(
             return Err(MeshDepthError::NoTriangles(name));
         }
     }
+    // The same renderer for both, so that what it leaves out is left out of both.
     let compare =
         |pose| ViewSums::new(&depth_image(reference, camera, pose), &depth_image(estimate, camera, pose));
     // Sums are added in the order of the views, whatever the number of threads.

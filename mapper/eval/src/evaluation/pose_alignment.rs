@@ -61,6 +61,7 @@ pub fn align_poses(
         matches.iter().map(move |m| (pose(reference, m.reference), pose(estimate, m.estimate)))
     };
     let count = matches.len() as f64;
+    // The rotation that is nearest to the mean of all relative rotations, in the sense of chords.
     let correlation: Matrix3<f64> =
         pairs().map(|(r, e)| r.rotation_matrix() * e.rotation_matrix().transpose()).sum();
     let (rotation, trace) =
@@ -69,9 +70,11 @@ pub fn align_poses(
     if trace <= 1.0 {
         return Err(PoseAlignmentError::Contradictory);
     }
+    // With the rotation known, the translation that leaves the least squares is a mean.
     let translation =
         pairs().map(|(r, e)| r.translation - rotation * e.translation).sum::<Vector3<f64>>() / count;
     let reference_from_estimate = RigidTransform { rotation, translation };
+    // What is left between a pair: translation in the first three numbers, rotation in the last three.
     let left = |(r, e): (RigidTransform, RigidTransform)| reference_from_estimate.compose(&e).tangent_to(&r);
     let rms = |first: usize| {
         (pairs().map(|pair| left(pair).fixed_rows::<3>(first).norm_squared()).sum::<f64>() / count).sqrt()

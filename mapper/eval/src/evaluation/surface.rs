@@ -77,6 +77,7 @@ pub fn evaluate_surface(
             return Err(SurfaceComparisonError::NotFinite(name));
         }
     }
+    // Both ways: distances from the estimate say how exact it is, those from the reference how complete.
     let tree = KdTree::new(reference);
     let accuracy = tree.distances(estimate);
     let completion = KdTree::new(estimate).distances(reference);

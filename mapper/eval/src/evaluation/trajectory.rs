@@ -86,6 +86,7 @@ pub fn evaluate_trajectory(
     estimate: &[TimedPose],
     options: &TrajectoryOptions,
 ) -> Result<TrajectoryEvaluation, TrajectoryError> {
+    // 1. Pairs of poses, by time.
     let matches = associate(&stamps(reference), &stamps(estimate), options.max_dt);
     if matches.len() < 2 {
         let (matched, estimate) = (matches.len(), estimate.len());
@@ -94,14 +95,17 @@ pub fn evaluate_trajectory(
     let truth: Vec<RigidTransform> =
         matches.iter().map(|m| reference[m.reference].world_from_camera).collect();
     let found: Vec<RigidTransform> = matches.iter().map(|m| estimate[m.estimate].world_from_camera).collect();
+    // 2. The estimate in the world of the reference: where its own world lies is nobody's error.
     let reference_from_estimate = align(&positions(&truth), &positions(&found), options.alignment)?;
     let found: Vec<_> = found.iter().map(|pose| reference_from_estimate.transform_pose(pose)).collect();
 
+    // 3. Absolute errors (ATE), and relative ones from pose to pose (RPE), which no alignment changes.
     let position_errors: Vec<f64> =
         truth.iter().zip(&found).map(|(t, f)| (t.translation - f.translation).norm()).collect();
     let steps = relative_errors(&truth, &found);
     let lengths: Vec<f64> = steps.iter().map(|e| e.translation.norm()).collect();
     let angles: Vec<f64> = steps.iter().map(|e| so3::log(&e.rotation).norm()).collect();
+    // 4. What the whole way has drifted: the relative error of its ends.
     let ends = |poses: &[RigidTransform]| [poses[0], poses[poses.len() - 1]];
     let end_drift = relative_errors(&ends(&truth), &ends(&found))[0];
     let figures = |errors: &[f64]| Statistics::of(errors).ok_or(TrajectoryError::NotFinite);

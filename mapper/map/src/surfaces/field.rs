@@ -69,6 +69,7 @@ pub fn mesh_from_field(
     let mut slab: Vec<f32> = Vec::with_capacity((SLAB + 1) * layer);
     for bottom in (0..points[2] - 1).step_by(SLAB) {
         let layers = (SLAB + 1).min(points[2] - bottom);
+        // The layer that both slabs share is not asked for again.
         let known = slab.len().checked_sub(layer).map_or(0, |top| {
             slab.copy_within(top.., 0);
             layer
@@ -76,6 +77,7 @@ pub fn mesh_from_field(
         slab.resize(layers * layer, f32::NAN);
         let first_row = bottom * points[1] + known / points[0];
         let rows = slab[known..].par_chunks_mut(points[0]).enumerate();
+        // Rows in parallel, pieces in their order: the mesh is the same for any number of threads.
         rows.for_each(|(row, out)| distances(&row_points(bounds, points, first_row + row), out));
         for piece in slab_surface(&slab, points, bottom) {
             assembly.add(&piece);

@@ -35,21 +35,25 @@ pub fn surface_of_field(
     let (min, max) = (field.region().origin().into(), field.region().end().into());
     let bounds = FieldBox { min, max, voxel };
     let level = Level::new();
+    // Most of a room is air: distances are asked for near the surface only.
     let near = NearSurface::new(field, &bounds, level)?;
     let response = ForwardResponse::new(&InverseResponse::srgb());
     let distances = |points: &[[f32; 3]], out: &mut [f32]| {
         out.fill(f32::NAN);
+        // Points that are far from the surface stay unknown.
         let wanted: Vec<usize> = near.of_row(points).collect();
         let places: Vec<_> = wanted.iter().map(|k| points[*k].map(f64::from)).collect();
         wanted.iter().zip(field.distances(level, &places)).for_each(|(k, distance)| out[*k] = distance);
     };
     let colours = |points: &[[f32; 3]], out: &mut [[f32; 3]]| {
         let places: Vec<_> = points.iter().map(|point| point.map(f64::from)).collect();
+        // A field has light, a mesh has display values.
         let display = |light: f32| f32::from(response.encode(light)) / 255.0;
         out.iter_mut().zip(field.colours(level, &places)).for_each(|(out, light)| *out = light.map(display));
     };
     let mesh = mesh_from_field(&bounds, distances, colours)?;
     let mut sight = Sight::new(&mesh);
+    // The field goes on behind what was seen, where it was never taught: only what a view shows is kept.
     let tolerance = TOLERANCE * f64::from(field.settings().truncation);
     for index in 0..source.count() {
         sight.look(&mesh, &source.view(index), tolerance);

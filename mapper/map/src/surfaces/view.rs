@@ -117,13 +117,16 @@ fn surface_at(view: &DepthView, inverse_depth: &[f32], u: usize, v: usize) -> Op
     if centre <= 0.0 {
         return None;
     }
+    // Inverse depth of a neighbour relative to the centre: small numbers keep their digits.
     let beside = |dx: isize, dy: isize| {
         let [u, v] = [u.checked_add_signed(dx)?, v.checked_add_signed(dy)?];
         let inverse = if u < width && v < height { inverse_depth[v * width + u] } else { 0.0 };
         (inverse > 0.0).then_some(inverse - centre)
     };
+    // 1. A rough slope, which does not reach across an edge.
     let along_x = gradient([beside(-2, 0), beside(2, 0)]);
     let along_y = gradient([beside(0, -2), beside(0, 2)]);
+    // 2. A fit to those neighbours that the rough slope explains.
     let mut fit = PlaneFit::default();
     let mut within = 0;
     for [dx, dy] in OFFSETS.into_iter().flat_map(|dy| OFFSETS.map(|dx| [dx, dy])) {
@@ -134,15 +137,18 @@ fn surface_at(view: &DepthView, inverse_depth: &[f32], u: usize, v: usize) -> Op
             fit.add(x, y, difference);
         }
     }
+    // Among pieces of several surfaces there is no plane.
     if fit.count < LEAST_SHARE * within as f32 {
         return None;
     }
     let [a, b, difference] = fit.solve()?;
+    // 3. From slopes per pixel to the plane `n.X = offset` in metres.
     let (a, b, inverse) = (a * fx as f32, b * fy as f32, centre + difference);
     let (x, y) = (((u as f64 - cx) / fx) as f32, ((v as f64 - cy) / fy) as f32);
     let c = inverse - a * x - b * y;
     let plane = Vector3::new(a, b, c);
     let offset = 1.0 / plane.norm();
+    // Seen at a grazing angle, a plane is hardly determined, and depth least of all.
     let cosine = inverse * offset / (x * x + y * y + 1.0).sqrt();
     let surface = PixelSurface { depth: 1.0 / inverse, normal: plane * offset, offset, cosine };
     (cosine > MIN_COSINE).then_some(surface)

@@ -55,6 +55,7 @@ impl SampleBox {
                         let vertices = triangle.map(|Edge { axis, corner }| {
                             let [dx, dy, dz] = CORNERS[corner];
                             let at = [x + dx, y + dy, z + dz];
+                            // A crossing belongs to the lower end of its edge: cells that share the edge share the vertex.
                             let slot = &mut known[self.index(at)][axis];
                             if *slot == NONE {
                                 *slot = piece.crossings.len() as u32;

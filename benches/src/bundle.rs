@@ -1,6 +1,8 @@
 //! A bundle that is being adjusted: blurred frames of the synthetic room and a map seeded from them.
 
-use mba_mapper::bundle::{BundleAdjustment, BundleSettings, FrameState, Keyframe, PathPrior, StepReport};
+use mba_mapper::bundle::{
+    BundleAdjustment, BundleSettings, FrameState, Keyframe, MapModel, PathPrior, StepReport,
+};
 use mba_mapper::exposure::{ExposurePath, RowTiming};
 use mba_mapper::map::MapKind;
 use mba_mapper::sensor::{ObservationPyramid, Sensor};

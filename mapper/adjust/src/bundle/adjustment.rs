@@ -1,6 +1,6 @@
 //! Joint optimisation of the map and of the paths of all exposures.
 
-use mba_map::map::{MapKind, Scene};
+use mba_map::map::{MapKind, Scene, SceneRenderer};
 use mba_raster::losses::{Exposure, LossTerms};
 use mba_raster::sensor::{Observation, ObservationPyramid, Sensor};
 use mba_tracker::geometry::RigidTransform;
@@ -10,7 +10,7 @@ use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
 use super::frame_state::FrameState;
-use super::map_model::FitContext;
+use super::map_model::{FitContext, MapModel};
 use super::path_metric::PathMetric;
 use super::path_step::{PathPrior, PathStep};
 use super::rectified::seen_at_once;
@@ -62,9 +62,9 @@ impl Keyframe {
 
 /// All that changes from step to step: enough to go on after an interruption.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BundleState {
+pub struct BundleState<M = SceneMap> {
     /// The map.
-    pub map: SceneMap,
+    pub map: M,
     /// One per keyframe.
     pub frames: Vec<FrameState>,
     /// Steps made.
@@ -77,13 +77,15 @@ pub struct BundleState {
 
 /// A map, keyframes, and what is needed to fit the one to the other.
 #[derive(Debug)]
-pub struct BundleAdjustment {
+pub struct BundleAdjustment<M: MapModel = SceneMap> {
     /// What was estimated so far.
-    pub state: BundleState,
+    pub state: BundleState<M>,
     pub(super) keyframes: Vec<Keyframe>,
     settings: BundleSettings,
     schedule: Schedule,
-    context: FitContext,
+    sensor: Sensor,
+    renderer: SceneRenderer,
+    context: M::Context,
     /// Order of the visits of the current round, and which round that is.
     round: (usize, Vec<usize>),
 }
@@ -117,16 +119,30 @@ impl BundleAdjustment {
         keyframes: Vec<Keyframe>,
         frames: Vec<FrameState>,
     ) -> Self {
+        let map = SceneMap::new(settings.kind, settings.seed);
+        let context = FitContext::new(level, sensor.clone());
         let schedule = Schedule::of(settings.kind, keyframes.len());
-        let state = BundleState {
-            map: SceneMap::new(settings.kind, settings.seed),
-            frames,
-            steps: 0,
-            scheduled_steps: 0,
-            position: 0.0,
-        };
-        let round = (usize::MAX, Vec::new());
-        Self { state, keyframes, settings, schedule, context: FitContext::new(level, sensor), round }
+        let frames = keyframes.into_iter().zip(frames).collect();
+        Self::with_map((map, context), schedule, level, sensor, settings, frames)
+    }
+}
+
+impl<M: MapModel> BundleAdjustment<M> {
+    /// Keyframes of one sensor with first estimates of their states, and an empty map of any kind with what it works with;
+    /// [`Self::seed`] fills it.
+    #[must_use]
+    pub fn with_map(
+        (map, context): (M, M::Context),
+        schedule: Schedule,
+        level: Level,
+        sensor: Sensor,
+        settings: BundleSettings,
+        frames: Vec<(Keyframe, FrameState)>,
+    ) -> Self {
+        let (keyframes, frames) = frames.into_iter().unzip();
+        let state = BundleState { map, frames, steps: 0, scheduled_steps: 0, position: 0.0 };
+        let (renderer, round) = (SceneRenderer::new(level), (usize::MAX, Vec::new()));
+        Self { state, keyframes, settings, schedule, sensor, renderer, context, round }
     }
 
     /// The keyframes.
@@ -138,7 +154,7 @@ impl BundleAdjustment {
     /// The sensor.
     #[must_use]
     pub fn sensor(&self) -> &Sensor {
-        &self.context.sensor
+        &self.sensor
     }
 
     /// The schedule.
@@ -193,7 +209,7 @@ impl BundleAdjustment {
                 self.seed_from(k, source);
             }
         }
-        self.state.map.model_mut().reorder();
+        self.state.map.reorder();
     }
 
     /// Adds what keyframe `k` sees and the map does not cover.
@@ -203,39 +219,16 @@ impl BundleAdjustment {
         let Keyframe { index, observation, .. } = &self.keyframes[k];
         let seen = seen_at_once(observation.level(0), path);
         let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
-        self.state.map.model_mut().seed(&mut self.context, &view, self.settings.max_gaussians);
+        self.state.map.seed(&mut self.context, &view, self.settings.max_gaussians);
     }
 
     /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
     pub fn uncovered_fraction(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
-        let FitContext { renderer, sensor, .. } = &mut self.context;
+        let Self { renderer, sensor, .. } = self;
         renderer.render(self.state.map.scene(), sensor.camera.at_level(level), world_from_camera);
         let alpha = &renderer.image.alpha;
         let open = alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
         open as f64 / alpha.len().max(1) as f64
-    }
-
-    /// The picture of keyframe `k` as the map explains it, with its blur and its rows, in light as bright as captured; none of
-    /// a field, whose virtual views take half a second each.
-    #[must_use]
-    pub fn explained(&mut self, k: usize) -> Option<Reblurred> {
-        let Scene::Gaussians(gaussians) = self.state.map.scene() else { return None };
-        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
-        let seen = keyframe.observation.level(0);
-        let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
-        let views = self.settings.view_count(keyframe, frame, &plan).of_row;
-        let gain = frame.log_gain.exp() as f32;
-        let image = self
-            .context
-            .gaussian_loss
-            .render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
-        let as_captured = |plane: &Vec<f32>| match &seen.falloff {
-            Some(falloff) => {
-                plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()
-            }
-            None => plane.iter().map(|light| gain * light).collect(),
-        };
-        Some(Reblurred { light: image.colour.each_ref().map(as_captured), alpha: image.alpha.clone() })
     }
 
     /// Number of virtual views of a pixel that a step with `plan` on keyframe `k` renders.
@@ -268,10 +261,10 @@ impl BundleAdjustment {
         let views = count.of_row;
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
         let draw = self.state.steps as u64;
-        let loss = self.state.map.model().evaluate(&mut self.context, exposure, plan, draw);
+        let loss = self.state.map.evaluate(&mut self.context, exposure, plan, draw);
 
         let BundleState { map, frames, steps, .. } = &mut self.state;
-        map.model_mut().step(&mut self.context, plan);
+        map.step(&mut self.context, plan);
         let frame = &mut frames[k];
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
@@ -309,7 +302,7 @@ impl BundleAdjustment {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
             let views = self.settings.view_count(unmapped, frame, &plan).of_row;
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-            let loss = self.state.map.model().evaluate(&mut self.context, exposure, &plan, draw);
+            let loss = self.state.map.evaluate(&mut self.context, exposure, &plan, draw);
             if loss.terms.total() < least {
                 (best, least) = (frame.clone(), loss.terms.total());
             }
@@ -339,7 +332,7 @@ impl BundleAdjustment {
 
     /// Puts detail where it is missing and removes what is useless.
     pub fn change_density(&mut self) {
-        self.state.map.model_mut().change_density(self.settings.max_gaussians);
+        self.state.map.change_density(self.settings.max_gaussians);
     }
 
     /// Length of the blur of keyframe `k`, full-resolution pixels.
@@ -347,7 +340,32 @@ impl BundleAdjustment {
     pub fn blur_px(&self, k: usize) -> f64 {
         let keyframe = &self.keyframes[k];
         let exposure = keyframe.observation.level(0).times.exposure;
-        self.state.frames[k].blur_px(&self.context.sensor.camera, keyframe.depth, exposure)
+        self.state.frames[k].blur_px(&self.sensor.camera, keyframe.depth, exposure)
+    }
+}
+
+impl BundleAdjustment {
+    /// The picture of keyframe `k` as the map explains it, with its blur and its rows, in light as bright as captured; none of
+    /// a field, whose virtual views take half a second each.
+    #[must_use]
+    pub fn explained(&mut self, k: usize) -> Option<Reblurred> {
+        let Scene::Gaussians(gaussians) = self.state.map.scene() else { return None };
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let seen = keyframe.observation.level(0);
+        let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
+        let views = self.settings.view_count(keyframe, frame, &plan).of_row;
+        let gain = frame.log_gain.exp() as f32;
+        let image = self
+            .context
+            .gaussian_loss
+            .render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
+        let as_captured = |plane: &Vec<f32>| match &seen.falloff {
+            Some(falloff) => {
+                plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()
+            }
+            None => plane.iter().map(|light| gain * light).collect(),
+        };
+        Some(Reblurred { light: image.colour.each_ref().map(as_captured), alpha: image.alpha.clone() })
     }
 }
 

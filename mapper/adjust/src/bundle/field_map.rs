@@ -13,7 +13,6 @@ use serde::{Deserialize, Serialize};
 use super::map_model::{FitContext, MapModel};
 use super::schedule::StepPlan;
 use super::seed_view::SeedView;
-use super::world_moves::WorldMoves;
 
 /// Most pixels that a step looks at.
 const PIXELS: usize = 2048;
@@ -50,7 +49,11 @@ impl FieldMap {
     }
 }
 
+/// The planes are as dense everywhere, and their nodes stay where they are. A field has no parts that belong to a keyframe:
+/// what moved is learnt again at its new place, and where it was, the rays that pass through make space free.
 impl MapModel for FieldMap {
+    type Context = FitContext;
+
     fn scene(&self) -> Scene<'_> {
         Scene::Field(&self.field)
     }
@@ -91,16 +94,6 @@ impl MapModel for FieldMap {
         let step = FieldStep::default().scaled(plan.shrink);
         self.adam.step(context.level, &mut self.field, context.field_loss.gradients(), step);
     }
-
-    /// The planes are as dense everywhere.
-    fn change_density(&mut self, _most: usize) {}
-
-    /// Nodes of planes stay where they are.
-    fn reorder(&mut self) {}
-
-    /// A field has no parts that belong to a keyframe: what moved is learnt again at its new place, and where it was,
-    /// the rays that pass through make space free.
-    fn move_along(&mut self, _moves: &WorldMoves) {}
 
     fn make_room(&mut self, seen: &Observation, world_from_camera: &RigidTransform) {
         if let Some(region) = measured_region(seen, world_from_camera) {

@@ -3,8 +3,6 @@
 use mba_map::map::{MapSize, Scene};
 use mba_raster::gaussians::Gaussians;
 use mba_raster::losses::{Exposure, ExposureLoss};
-use mba_raster::sensor::Observation;
-use mba_tracker::geometry::RigidTransform;
 use serde::{Deserialize, Serialize};
 
 use super::map_model::{FitContext, MapModel};
@@ -25,7 +23,10 @@ pub struct GaussianMap {
     optimiser: OptimiserState,
 }
 
+/// There are no bounds that room would have to be made within.
 impl MapModel for GaussianMap {
+    type Context = FitContext;
+
     fn scene(&self) -> Scene<'_> {
         Scene::Gaussians(&self.gaussians)
     }
@@ -83,7 +84,4 @@ impl MapModel for GaussianMap {
     fn move_along(&mut self, moves: &WorldMoves) {
         move_gaussians(&mut self.gaussians, &self.optimiser.origins, moves);
     }
-
-    /// There are no bounds.
-    fn make_room(&mut self, _seen: &Observation, _world_from_camera: &RigidTransform) {}
 }

@@ -1,8 +1,7 @@
 //! What a map is seeded from.
 
-use mba_tracker::geometry::RigidTransform;
-
 use mba_raster::sensor::Observation;
+use mba_tracker::geometry::RigidTransform;
 
 /// Where the depth of new Gaussians comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,15 +14,15 @@ pub enum DepthSource {
 
 /// What a keyframe shows, and from where.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SeedView<'a> {
+pub struct SeedView<'a> {
     /// Index in the data set.
-    pub(super) index: usize,
+    pub index: usize,
     /// What was captured, at full resolution.
-    pub(super) seen: &'a Observation,
+    pub seen: &'a Observation,
     /// The pose at mid exposure.
-    pub(super) world_from_camera: RigidTransform,
+    pub world_from_camera: RigidTransform,
     /// Gain on the map's light that gives what was captured.
-    pub(super) gain: f32,
+    pub gain: f32,
     /// Where depth comes from.
-    pub(super) source: DepthSource,
+    pub source: DepthSource,
 }

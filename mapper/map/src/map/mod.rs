@@ -7,7 +7,7 @@ mod scene;
 mod stored;
 
 pub use kind::{MapKind, MapSize};
-pub use scene::{Scene, SceneRenderer};
+pub use scene::{RenderedMap, Scene, SceneRenderer};
 pub use stored::{MapFileError, StoredMap};
 
 /// Name of the file of a map of Gaussians.

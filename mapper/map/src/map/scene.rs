@@ -1,4 +1,6 @@
-//! Maps of both kinds, seen from a pose.
+//! Maps of every kind, seen from a pose.
+
+use core::fmt;
 
 use mba_raster::gaussians::Gaussians;
 use mba_raster::raster::{RasterImage, RasterScratch, RasterView, Rasterizer};
@@ -7,6 +9,12 @@ use mba_tracker::simd::Level;
 
 use mba_field::triplane::{FieldRenderer, SamplingSettings, TriplaneField};
 
+/// A map of a kind of its own, which renders itself.
+pub trait RenderedMap: fmt::Debug + Sync {
+    /// The view of `camera` from a pose: linear light in front of black, depth times alpha in metres, and alpha.
+    fn render(&self, camera: &PinholeCamera, world_from_camera: &RigidTransform) -> RasterImage;
+}
+
 /// A map that can be looked at.
 #[derive(Clone, Copy, Debug)]
 pub enum Scene<'a> {
@@ -14,6 +22,8 @@ pub enum Scene<'a> {
     Gaussians(&'a Gaussians),
     /// A tri-plane field.
     Field(&'a TriplaneField),
+    /// Of any other kind.
+    Other(&'a dyn RenderedMap),
 }
 
 impl<'a> From<&'a Gaussians> for Scene<'a> {
@@ -28,7 +38,7 @@ impl<'a> From<&'a TriplaneField> for Scene<'a> {
     }
 }
 
-/// Renders maps of both kinds; memory is kept from view to view.
+/// Renders maps of every kind; memory is kept from view to view.
 #[derive(Debug)]
 pub struct SceneRenderer {
     rasterizer: Rasterizer,
@@ -59,6 +69,7 @@ impl SceneRenderer {
                 self.rasterizer.forward(map, &view, &mut self.scratch, &mut self.image);
             }
             Scene::Field(map) => self.image = self.field.render(map, &camera, world_from_camera),
+            Scene::Other(map) => self.image = map.render(&camera, world_from_camera),
         }
     }
 }

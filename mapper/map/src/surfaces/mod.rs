@@ -28,7 +28,7 @@ pub use view::{DepthView, ViewSource};
 use crate::map::Scene;
 
 /// The coloured surface of a map that views of it show, with voxels of `settings.voxel`: a field's is where its distance
-/// is zero, that of Gaussians is fused from the views. Without parts of less than `trim.least_area`.
+/// is zero, that of other maps is fused from the views. Without parts of less than `trim.least_area`.
 ///
 /// # Errors
 /// See [`fuse_views`] and [`surface_of_field`].
@@ -39,7 +39,7 @@ pub fn surface_of_map(
     trim: &Trim,
 ) -> Result<Mesh, SurfaceError> {
     match map {
-        Scene::Gaussians(_) => surface_of_views(source, settings, trim),
+        Scene::Gaussians(_) | Scene::Other(_) => surface_of_views(source, settings, trim),
         Scene::Field(field) => surface_of_field(field, settings.voxel, source, trim),
     }
 }
@@ -48,7 +48,7 @@ pub fn surface_of_map(
 #[must_use]
 pub fn passes(map: Scene<'_>) -> usize {
     match map {
-        Scene::Gaussians(_) => 3,
+        Scene::Gaussians(_) | Scene::Other(_) => 3,
         Scene::Field(_) => 1,
     }
 }

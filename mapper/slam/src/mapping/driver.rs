@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use mba_adjust::bundle::{BundleAdjustment, BundleState};
+use mba_adjust::bundle::{BundleAdjustment, BundleState, MapModel};
 use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;

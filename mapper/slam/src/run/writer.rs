@@ -182,7 +182,7 @@ impl RunWriter {
     /// Writes the map of the run, and removes one of the other kind that an earlier run left.
     ///
     /// # Errors
-    /// As [`Self::create`].
+    /// As [`Self::create`], and for a map of a kind that has no file.
     pub fn write_map<'a>(&self, map: impl Into<Scene<'a>>) -> Result<(), RunError> {
         let other = match map.into() {
             Scene::Gaussians(map) => {
@@ -192,6 +192,10 @@ impl RunWriter {
             Scene::Field(map) => {
                 write_field(&self.folder().join(FIELD_FILE), map).map_err(RunError::from_write)?;
                 MAP_FILE
+            }
+            Scene::Other(_) => {
+                let reason = io::Error::new(io::ErrorKind::Unsupported, "this kind of map has no file");
+                return Err(RunError::unwritable(self.folder(), reason));
             }
         };
         remove(&self.folder().join(other))

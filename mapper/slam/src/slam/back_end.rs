@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use mba_adjust::bundle::{BundleState, Keyframe, PathPrior};
+use mba_adjust::bundle::{BundleState, Keyframe, MapModel, PathPrior};
 use mba_io::checkpoint::exact_poses::{numbers, pose};
 use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::thread;
 use std::time::Instant;
 
-use mba_adjust::bundle::{BundleAdjustment, BundleState};
+use mba_adjust::bundle::{BundleAdjustment, BundleState, MapModel};
 use mba_io::checkpoint::load;
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;

@@ -1,8 +1,8 @@
 //! The map while frames come in.
 
 use mba_adjust::bundle::{
-    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed,
-    Schedule, log_brightness,
+    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, MapModel, NOTICEABLE, PathPrior,
+    Placed, Schedule, log_brightness,
 };
 use mba_io::dataset::RgbdFrame;
 use mba_io::trajectory_file::TimedExposure;

@@ -1,10 +1,11 @@
 //! A bundle that is being adjusted: blurred frames of the synthetic room and a map seeded from them.
 
 use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, FrameState, Keyframe, MapKind, ObservationPyramid, PathPrior, Sensor,
-    StepReport,
+    BundleAdjustment, BundleSettings, FrameState, Keyframe, MapModel, PathPrior, StepReport,
 };
 use mba_mapper::exposure::{ExposurePath, RowTiming};
+use mba_mapper::map::MapKind;
+use mba_mapper::sensor::{ObservationPyramid, Sensor};
 use mba_mapper::synth::{SynthConfig, SynthError, SynthFrame, SynthSequence};
 use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::InverseResponse;

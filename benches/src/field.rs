@@ -1,11 +1,12 @@
 //! A tri-plane field that has begun to take the shape of the synthetic room, and a frame to compare it with.
 
-use mba_mapper::bundle::{Exposure, ExposureLoss, Observation, ObservationPyramid};
 use mba_mapper::exposure::ExposurePath;
+use mba_mapper::losses::{Exposure, ExposureLoss};
+use mba_mapper::sensor::{Observation, ObservationPyramid};
 use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence};
 use mba_mapper::triplane::{
-    FieldExposure, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
-    TriplaneEngine, TriplaneField,
+    FieldExposure, FieldLoss, FieldSettings, FieldStep, FieldWeights, Region, SamplingSettings, TriplaneAdam,
+    TriplaneField,
 };
 use mba_tracker::simd::Level;
 
@@ -23,7 +24,7 @@ const STEPS: u64 = 150;
 /// A field in training.
 pub struct FieldInput {
     field: TriplaneField,
-    engine: TriplaneEngine,
+    field_loss: FieldLoss,
     seen: Observation,
     path: ExposurePath,
 }
@@ -41,12 +42,12 @@ impl FieldInput {
         let pyramid = ObservationPyramid::new(&sensor, &frame.into_captured(0), 1);
         let seen = pyramid.expect("a frame has the size of its camera").level(0).clone();
         let field = TriplaneField::new(around(&seen, &path), FieldSettings::default(), 1);
-        let mut input = Self { field, engine: TriplaneEngine::new(level, &sensor), seen, path };
+        let mut input = Self { field, field_loss: FieldLoss::new(level, &sensor), seen, path };
         let mut adam = TriplaneAdam::default();
         let step = FieldStep::default();
         for k in 0..STEPS {
             input.evaluate(k, false);
-            adam.step(level, &mut input.field, input.engine.gradients(), step);
+            adam.step(level, &mut input.field, input.field_loss.gradients(), step);
         }
         Ok(input)
     }
@@ -63,13 +64,13 @@ impl FieldInput {
             seed: 1,
             step,
         };
-        self.engine.evaluate(&self.field, &given)
+        self.field_loss.evaluate(&self.field, &given)
     }
 
     /// Samples of geometry and of colour in the last evaluation.
     #[must_use]
     pub fn samples(&self) -> [usize; 2] {
-        self.engine.samples(PIXELS)
+        self.field_loss.samples(PIXELS)
     }
 
     /// Bytes of the field per cubic metre of its box.

@@ -5,6 +5,7 @@ pub mod map;
 pub mod slam;
 pub mod surface;
 pub mod synth;
+mod values;
 
 use std::path::PathBuf;
 
@@ -12,7 +13,9 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
-use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
+
+pub use values::{BlurMode, Switch};
+use values::{non_negative, positive, size, virtual_views};
 
 /// Most worker threads: several for every core of the largest machines.
 pub const MOST_THREADS: u16 = 1024;
@@ -183,16 +186,6 @@ pub struct Tracking {
     pub self_calibrate: Switch,
 }
 
-/// Values of `--blur`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum BlurMode {
-    /// Virtual views along the motion, as many as the blur length asks for
-    #[default]
-    Auto,
-    /// One view per frame
-    Off,
-}
-
 /// Values of `--reference`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Reference {
@@ -201,16 +194,6 @@ pub enum Reference {
     /// Deblurred where that lowers the residual
     #[default]
     Deblurred,
-}
-
-/// On or off.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum Switch {
-    /// Yes
-    #[default]
-    On,
-    /// No
-    Off,
 }
 
 impl From<&Tracking> for TrackingOptions {
@@ -390,34 +373,4 @@ impl From<AlignMode> for Alignment {
             AlignMode::None => Self::None,
         }
     }
-}
-
-/// A finite number that is not negative.
-fn non_negative(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value >= 0.0 => Ok(value),
-        _ => Err("a number that is not negative is needed".to_owned()),
-    }
-}
-
-/// A finite number above zero.
-fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value.is_finite() && value > 0.0 => Ok(value),
-        _ => Err("a number above zero is needed".to_owned()),
-    }
-}
-
-/// A number of virtual views that the tracker has room for.
-fn virtual_views(text: &str) -> Result<usize, String> {
-    match text.parse::<usize>() {
-        Ok(views) if (1..=MAX_VIRTUAL_VIEWS).contains(&views) => Ok(views),
-        _ => Err(format!("a number from 1 to {MAX_VIRTUAL_VIEWS} is needed")),
-    }
-}
-
-/// Two numbers with an x between them.
-fn size(text: &str) -> Result<(usize, usize), String> {
-    let parsed = text.split_once('x').and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    parsed.ok_or_else(|| "a size such as 640x480 is needed".to_owned())
 }

@@ -13,6 +13,7 @@ pub mod console;
 pub mod failure;
 pub mod interrupt;
 pub mod report;
+pub mod written_run;
 
 use args::{Cli, Command, EvalCommand, MOST_THREADS};
 use console::Console;

@@ -7,49 +7,23 @@
 //!
 //! [`mapping`] goes on from there. [`continuity`] repairs exposures that do not fit their neighbours; [`bundle`] seeds
 //! [`gaussians`] from depth and adjusts them together with the path of every exposure. A step renders what the moving
-//! camera sees ([`exposure`], the mean of views of [`raster`]), compares it with the captured frame ([`losses`]) and
-//! takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can go on. The
-//! result is another [`run`], with a map.
+//! camera sees ([`exposure`], the mean of views of [`raster`]), compares it with the captured frame ([`losses`],
+//! [`sensor`]) and takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can
+//! go on. The result is another [`run`], with a map.
 //!
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
-//! [`rendering`] makes images of a map, with [`infill`] where it has nothing, and [`surfaces`] meshes; [`evaluation`] and [`image_folders`] compare
-//! results with the truth. [`export`] writes runs in the formats of other programs.
+//! [`rendering`] makes images of a [`map`], with [`infill`] where it has nothing, and [`surfaces`] a [`mesh`];
+//! [`evaluation`] and [`image_folders`] compare results with the truth, [`statistics`] summarises. [`export`] writes runs
+//! in the formats of other programs.
 
-mod binary_file;
-pub mod bundle;
-pub mod checkpoint;
-pub mod continuity;
-pub mod dataset;
-pub mod deblurring;
-mod error;
-pub mod evaluation;
-pub mod export;
-pub mod exposure;
-pub mod gaussians;
-pub mod image_folders;
-pub mod imu;
-pub mod infill;
-pub mod losses;
-pub mod mapping;
-pub mod output;
-pub mod places;
-mod ply;
-mod png;
-pub mod pose_graph;
-pub mod raster;
-pub mod rendering;
-pub mod run;
-pub mod self_calibration;
-pub mod slam;
-pub mod surfaces;
-pub mod synth;
-mod text_lines;
-pub mod tracking;
-pub mod trajectory_file;
-pub mod triplane;
-mod uncertainty;
-mod whole_file;
-
-pub use binary_file::BinaryFileError;
-pub use error::FileError;
+pub use mba_adjust::{bundle, continuity, deblurring, places, pose_graph};
+pub use mba_eval::{evaluation, image_folders};
+pub use mba_field::triplane;
+pub use mba_io::{
+    BinaryFileError, FileError, checkpoint, dataset, imu, mesh, output, statistics, trajectory_file,
+};
+pub use mba_map::{infill, map, rendering, surfaces};
+pub use mba_raster::{exposure, gaussians, losses, raster, sensor};
+pub use mba_slam::{export, mapping, run, self_calibration, slam, tracking};
+pub use mba_synth as synth;

@@ -37,7 +37,7 @@ fn the_seeds_reach_what_they_are_for() {
     let read = |name: &str| fs::read(root.join(name)).unwrap();
     let path = Path::new("file.ply");
     assert_eq!(mba_mapper::gaussians::parse_ply(path, &read("gaussians/six")).unwrap().len(), 6);
-    assert_eq!(mba_mapper::surfaces::parse_mesh(path, &read("mesh/square")).unwrap().triangles.len(), 2);
+    assert_eq!(mba_mapper::mesh::parse_mesh(path, &read("mesh/square")).unwrap().triangles.len(), 2);
     assert!(mba_mapper::dataset::read_calibration(&root.join("calibration/everything")).is_ok());
     assert_eq!(
         mba_mapper::dataset::read_exposure_times(&root.join("exposure_times/table")).unwrap().0.len(),

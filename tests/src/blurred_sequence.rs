@@ -4,10 +4,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use mba_mapper::dataset::{self, Dataset};
-use mba_mapper::evaluation::{blur_length, motion_of};
+use mba_mapper::exposure::{blur_length, motion_of};
+use mba_mapper::map::StoredMap;
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::output::{OutputFolder, Permission};
-use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, StoredMap, Summary};
+use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, Summary};
 use mba_mapper::slam::{SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
 use mba_mapper::tracking::{TrackingOptions, track_dataset};

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use mba_mapper::gaussians::{Gaussians, write_ply};
-use mba_mapper::run::{FrameRecord, FrameStatus, MAP_FILE, RunCamera, RunSettings, RunWriter};
+use mba_mapper::map::MAP_FILE;
+use mba_mapper::run::{FrameRecord, FrameStatus, RunCamera, RunSettings, RunWriter};
 use mba_mapper::trajectory_file::{TimedExposure, TimedPose};
 
 /// Writes a run into the folder `run`; frames have pose, status and whether they are keyframes.

@@ -7,11 +7,11 @@ use fearless_simd::Simd;
 
 /// Every level that a CPU with level `best` can run, weakest first; used to compare levels with each other.
 ///
-/// The scalar level is among them when the crate is built with `std`.
+/// The scalar level is among them when the crate is built with the feature `scalar`.
 #[must_use]
 pub fn levels_up_to(best: Level) -> ArrayVec<Level, 5> {
     let mut levels = ArrayVec::new();
-    #[cfg(feature = "std")]
+    #[cfg(any(test, feature = "scalar"))]
     levels.push(Level::fallback());
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     {

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, ValueEnum};
-use mba_mapper::bundle::MapKind;
+use mba_mapper::map::MapKind;
 use mba_mapper::mapping::MapSettings;
 
-use super::BlurMode;
+use super::values::{BlurMode, positive_seconds, seconds};
 
 /// Arguments of `mba map`.
 #[derive(Debug, Args)]
@@ -127,16 +127,4 @@ impl Default for Mapping {
 
 fn default_keyframes() -> NonZeroUsize {
     NonZeroUsize::new(MapSettings::default().max_keyframes).unwrap_or(NonZeroUsize::MIN)
-}
-
-/// A number of seconds, finite and not negative.
-pub(super) fn seconds(text: &str) -> Result<Duration, String> {
-    let seconds: f64 = text.parse().map_err(|_| "expected a number of seconds".to_owned())?;
-    Duration::try_from_secs_f64(seconds).map_err(|error| error.to_string())
-}
-
-/// A positive, finite number of seconds.
-pub(super) fn positive_seconds(text: &str) -> Result<Duration, String> {
-    let duration = seconds(text)?;
-    if duration.is_zero() { Err("expected more than 0 seconds".to_owned()) } else { Ok(duration) }
 }

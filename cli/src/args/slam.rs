@@ -7,8 +7,8 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use mba_mapper::slam::{Arrival, SlamReference, SlamSettings};
 
-use super::map::{Field, positive_seconds, seconds};
-use super::{BlurMode, Switch, virtual_views};
+use super::map::Field;
+use super::values::{BlurMode, Switch, positive_seconds, seconds, virtual_views};
 
 /// Arguments of `mba slam`.
 #[derive(Debug, Args)]

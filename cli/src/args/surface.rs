@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use mba_mapper::evaluation::DEFAULT_MAX_DT;
 
-use super::{non_negative, positive};
+use super::values::{non_negative, positive};
 
 /// Arguments of `mba mesh`.
 #[derive(Debug, Args)]

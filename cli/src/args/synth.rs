@@ -11,7 +11,7 @@ use mba_mapper::synth::{
     SynthConfig,
 };
 
-use super::{Switch, non_negative, size};
+use super::values::{Switch, non_negative, size};
 
 /// Arguments of `mba synth`.
 #[derive(Debug, Args)]

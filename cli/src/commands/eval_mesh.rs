@@ -6,7 +6,8 @@ use std::path::Path;
 use mba_mapper::evaluation::{
     MeshDepthFigures, SurfaceFigures, evaluate_mesh_depth, evaluate_surface, refine_by_icp,
 };
-use mba_mapper::surfaces::{Mesh, read_mesh, sample_surface};
+use mba_mapper::mesh::{Mesh, read_mesh};
+use mba_mapper::surfaces::sample_surface;
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;

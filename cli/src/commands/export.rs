@@ -8,16 +8,17 @@ use mba_mapper::export::{
     ExportError, POSES_FILE, PosedFrame, PosedFrames, SceneExport, SceneLayout, TIMES_FILE, format_euroc,
     format_kitti_poses, format_kitti_times, format_tum, is_own_euroc, is_own_tum,
 };
+use mba_mapper::map::{MAP_FILE, StoredMap};
 use mba_mapper::output::{ExportFolder, OutputFile, Permission};
-use mba_mapper::run::{EXPOSURES_FILE, FRAMES_FILE, MAP_FILE, Run, SUMMARY_FILE, StoredMap, TRAJECTORY_FILE};
+use mba_mapper::run::{EXPOSURES_FILE, FRAMES_FILE, Run, SUMMARY_FILE, TRAJECTORY_FILE};
 use serde::Serialize;
 
 use super::open;
-use super::written_run::{name, refuse};
 use crate::args::export::{Export, ExportFormat};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
 use crate::report::table::pairs;
+use crate::written_run::{name, refuse};
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

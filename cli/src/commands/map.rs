@@ -8,13 +8,13 @@ use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
 use mba_mapper::run::{Run, RunSettings, Summary};
 use serde_json::json;
 
-use super::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 use super::{calibrate, open};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
 use crate::interrupt;
 use crate::report::table;
+use crate::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 
 /// Steps of the progress bar: positions are shares, not counts.
 const PROGRESS_STEPS: usize = 1000;

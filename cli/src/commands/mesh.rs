@@ -4,23 +4,23 @@ use std::path::Path;
 use std::time::Instant;
 
 use indicatif::ProgressBar;
+use mba_mapper::map::Scene;
+use mba_mapper::mesh::{MeshFormat, YAxis};
 use mba_mapper::output::{OutputFile, Permission};
-use mba_mapper::rendering::Scene;
 use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::surfaces::{
-    DepthView, FusionSettings, MapViews, MeshFormat, SurfaceError, Trim, ViewSource, YAxis, passes,
-    surface_of_map,
+    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map,
 };
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use super::written_run::refuse;
 use crate::args::surface::Mesh;
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, failed, is_disk_full};
 use crate::report::table::pairs;
+use crate::written_run::refuse;
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

@@ -19,4 +19,3 @@ pub mod report;
 pub mod slam;
 pub mod synth;
 pub mod track;
-pub mod written_run;

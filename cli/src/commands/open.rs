@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
-use mba_mapper::run::{FIELD_FILE, MAP_FILE, Run, RunError, StoredMap};
+use mba_mapper::map::{FIELD_FILE, MAP_FILE, StoredMap};
+use mba_mapper::run::{Run, RunError};
 use mba_mapper::self_calibration::read_back;
 
 use crate::failure::{OrBadInput, bad_input};

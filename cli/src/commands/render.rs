@@ -4,19 +4,20 @@ use std::path::Path;
 use std::time::Instant;
 
 use mba_mapper::evaluation::PoseAlignment;
+use mba_mapper::map::{MAP_FILE, StoredMap};
 use mba_mapper::output::{Permission, ViewFolder};
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
-use mba_mapper::run::{MAP_FILE, Run, RunCamera, Spread, StoredMap};
+use mba_mapper::run::{Run, RunCamera, Spread};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use super::written_run::refuse;
 use crate::args::{Render, Switch, ViewNames};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
 use crate::report::table::{pairs, percent};
+use crate::written_run::refuse;
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

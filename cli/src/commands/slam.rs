@@ -10,13 +10,13 @@ use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::tracking::TrackingError;
 use serde_json::json;
 
-use super::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
 use super::{calibrate, open, outcome};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
 use crate::interrupt;
 use crate::report::table;
+use crate::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
 
 /// Steps of the refinement's progress bar: positions are shares, not counts.
 const REFINEMENT_STEPS: u64 = 1000;

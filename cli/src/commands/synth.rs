@@ -5,11 +5,11 @@ use std::path::Path;
 use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset};
 use serde::Serialize;
 
-use super::written_run::{OUT_HINT, refuse};
 use crate::args::synth::Synth;
 use crate::console::Console;
 use crate::failure::{OrBadInput, is_disk_full};
 use crate::report::table::pairs;
+use crate::written_run::{OUT_HINT, refuse};
 
 /// What is printed.
 #[derive(Clone, Debug, Serialize)]

@@ -3,18 +3,17 @@
 use std::path::Path;
 
 use mba_mapper::dataset::Dataset;
-use mba_mapper::deblurring::write_deblurred_keyframes;
-use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary, write_deblurred_keyframes};
 use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
 use serde_json::json;
 
-use super::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
 use super::{calibrate, open, outcome};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;
 use crate::failure::{OrBadInput, interrupted};
 use crate::interrupt;
 use crate::report::table;
+use crate::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
 
 /// Tracks a data set into a RUN folder and prints the summary.
 ///

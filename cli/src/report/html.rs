@@ -1,7 +1,8 @@
 //! `report.html`: one file without network access.
 
-use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
+use mba_mapper::evaluation::{BlurFigures, TrajectoryFigures};
 use mba_mapper::run::{MapFigures, Run, SlamFigures, Spread, Summary};
+use mba_mapper::statistics::Statistics;
 use serde_json::Value;
 
 use super::plots::Plot;

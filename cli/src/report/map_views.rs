@@ -4,8 +4,9 @@ use std::fs;
 
 use image::RgbImage;
 use mba_mapper::dataset::Dataset;
+use mba_mapper::map::{FIELD_FILE, MAP_FILE, StoredMap};
 use mba_mapper::rendering::{Behind, ViewRenderer};
-use mba_mapper::run::{FIELD_FILE, MAP_FILE, Run, RunCamera, StoredMap};
+use mba_mapper::run::{Run, RunCamera};
 
 use super::html::escape;
 use super::pictures::jpeg_base64;

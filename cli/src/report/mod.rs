@@ -22,7 +22,7 @@ use mba_mapper::dataset::Dataset;
 use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::run::Run;
 
-use crate::commands::written_run::refuse;
+use crate::written_run::refuse;
 
 pub use plots::{Plot, plots};
 pub use view::RunView;

@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
-use mba_mapper::evaluation::{BlurFigures, Statistics, TrajectoryFigures};
+use mba_mapper::evaluation::{BlurFigures, TrajectoryFigures};
 use mba_mapper::run::{MapFigures, SlamFigures, Spread, Summary};
+use mba_mapper::statistics::Statistics;
 
 /// The table of a trajectory evaluation, lengths in metres, angles in degrees.
 #[must_use]

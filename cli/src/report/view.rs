@@ -1,7 +1,8 @@
 //! What a report shows of a run, prepared for drawing.
 
 use mba_mapper::dataset::{Dataset, survey};
-use mba_mapper::evaluation::{TrajectoryOptions, blur_length, evaluate_trajectory, motion_of};
+use mba_mapper::evaluation::{TrajectoryOptions, evaluate_trajectory};
+use mba_mapper::exposure::{blur_length, motion_of};
 use mba_mapper::run::{FrameStatus, Run, mid_pose};
 use mba_mapper::trajectory_file::{TimedExposure, TimedPose};
 use mba_tracker::geometry::RigidTransform;

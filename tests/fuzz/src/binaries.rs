@@ -5,8 +5,9 @@ use std::path::Path;
 
 use mba_mapper::evaluation::evaluate_surface;
 use mba_mapper::gaussians::{Gaussians, parse_ply};
+use mba_mapper::mesh::{depth_image, format_mesh, parse_mesh};
 use mba_mapper::rendering::{Behind, ViewRenderer};
-use mba_mapper::surfaces::{depth_image, format_mesh, parse_mesh, sample_surface};
+use mba_mapper::surfaces::sample_surface;
 use mba_mapper::triplane::read_field;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::photometric::InverseResponse;

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use mba_mapper::mesh::read_mesh;
 use mba_mapper::run::Run;
-use mba_mapper::surfaces::read_mesh;
 use mba_tests::tree::tree;
 use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 use serde_json::Value;

@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use mba_mapper::gaussians::{Gaussian, Gaussians};
+use mba_mapper::mesh::{Mesh, read_mesh, write_mesh};
 use mba_mapper::run::{FrameStatus, RunCamera};
-use mba_mapper::surfaces::{Mesh, read_mesh, write_mesh};
 use mba_mapper::trajectory_file::{TimedPose, write_trajectory};
 use mba_tests::still_run;
 use mba_tracker::geometry::RigidTransform;

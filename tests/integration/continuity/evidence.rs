@@ -102,7 +102,7 @@ impl Filmed {
 
     /// Blur of a frame in pixels.
     fn blur(&self, k: usize) -> f64 {
-        mba_mapper::evaluation::blur_length(&self.truth[k], &self.camera, 2.5)
+        mba_mapper::exposure::blur_length(&self.truth[k], &self.camera, 2.5)
     }
 }
 

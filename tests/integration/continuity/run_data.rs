@@ -1,6 +1,7 @@
 //! Repairing what a run recorded.
 
-use mba_mapper::continuity::{ContinuityError, ContinuitySettings, FrameVerdict, repair_run};
+use mba_mapper::continuity::{ContinuityError, ContinuitySettings, FrameVerdict};
+use mba_mapper::mapping::repair_run;
 use mba_mapper::run::{FrameRecord, FrameStatus};
 use mba_mapper::trajectory_file::TimedExposure;
 use nalgebra::Vector6;

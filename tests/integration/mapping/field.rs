@@ -1,8 +1,8 @@
 //! A tri-plane field as the map.
 
-use mba_mapper::bundle::MapKind;
+use mba_mapper::map::{FIELD_FILE, MAP_FILE, MapKind};
 use mba_mapper::mapping::MapSettings;
-use mba_mapper::run::{FIELD_FILE, MAP_FILE, Merit};
+use mba_mapper::run::Merit;
 use mba_mapper::synth::SynthConfig;
 use mba_mapper::triplane::read_field;
 use mba_tests::blurred_sequence::{BlurredSequence, names};

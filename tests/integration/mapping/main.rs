@@ -5,3 +5,4 @@ mod quality;
 mod recovery;
 mod rolling;
 mod settings;
+mod third_kind;

@@ -1,6 +1,6 @@
 //! Wrong exposures are put right, and frames that are no keyframes are found.
 
-use mba_mapper::evaluation::motion_of;
+use mba_mapper::exposure::motion_of;
 use mba_mapper::mapping::MapSettings;
 use mba_mapper::run::Run;
 use mba_mapper::synth::{

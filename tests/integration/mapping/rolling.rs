@@ -2,8 +2,8 @@
 
 use std::ops::ControlFlow;
 
-use mba_mapper::bundle::MapKind;
 use mba_mapper::dataset::{Calibration, Readout, Vignetting};
+use mba_mapper::map::MapKind;
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::run::{Run, Summary};
 use mba_mapper::synth::{SensorModel, SynthConfig};

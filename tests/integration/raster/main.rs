@@ -4,6 +4,7 @@ mod derivatives;
 mod exposure;
 mod golden;
 mod levels;
+mod misuse;
 mod ply;
 mod poison;
 mod reference;

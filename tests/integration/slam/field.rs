@@ -1,7 +1,7 @@
 //! A tri-plane field as the map that grows.
 
-use mba_mapper::bundle::MapKind;
-use mba_mapper::run::{FIELD_FILE, FrameStatus, Run};
+use mba_mapper::map::{FIELD_FILE, MapKind};
+use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::slam::SlamSettings;
 use mba_mapper::synth::SynthConfig;
 use mba_mapper::triplane::read_field;

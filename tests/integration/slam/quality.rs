@@ -1,7 +1,8 @@
 //! What comes of a short blurred sequence.
 
 use mba_mapper::gaussians::read_ply;
-use mba_mapper::run::{FrameStatus, MAP_FILE, Run};
+use mba_mapper::map::MAP_FILE;
+use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::slam::SlamSettings;
 use mba_mapper::synth::SynthConfig;
 use mba_tests::blurred_sequence::{BlurredSequence, assert_same_map, names};

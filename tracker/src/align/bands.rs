@@ -4,11 +4,10 @@ use arrayvec::ArrayVec;
 use core::ops::Range;
 
 use super::Estimate;
-use super::objective::Objective;
-use super::placement::MAX_BANDS;
+use super::problem::Objective;
 use crate::trajectory::BowedTrajectory;
 use crate::transfer::{
-    MAX_VIRTUAL_VIEWS, PatchSite, RowBand, RowTimes, TransferParts, TransferProblem, VirtualView,
+    MAX_BANDS, MAX_VIRTUAL_VIEWS, PatchSite, RowBand, RowTimes, TransferParts, TransferProblem, VirtualView,
 };
 
 /// The bands of rows of a frame at an estimate, those without any patch left out.

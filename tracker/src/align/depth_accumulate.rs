@@ -7,8 +7,8 @@
 
 use fearless_simd::{f32x8, prelude::*};
 
+use super::depth_problem::DepthSums;
 use super::depth_samples::{DepthSamples, LANES};
-use super::depth_term::DepthSums;
 
 /// Points per batch: whole blocks.
 const BATCH: usize = 8 * LANES;

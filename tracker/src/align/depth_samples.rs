@@ -9,7 +9,7 @@
 use fearless_simd::{f32x8, i32x8, mask32x8, prelude::*};
 use nalgebra::{Matrix3, Vector3};
 
-use super::depth_term::DepthProblem;
+use super::depth_problem::DepthProblem;
 use crate::geometry::RigidTransform;
 use crate::surface::spread_limit;
 

@@ -9,46 +9,11 @@ use fearless_simd::{Level, dispatch, prelude::*};
 use nalgebra::{Matrix6, Vector6};
 
 use super::depth_accumulate::DepthBatch;
+pub use super::depth_problem::{DepthProblem, DepthSums};
 use super::depth_samples::DepthSampler;
 use super::scale::{SIGMA_PER_MEDIAN_ABSOLUTE, median};
-use crate::geometry::{PinholeCamera, RigidTransform};
-use crate::surface::{InverseDepthMap, SurfacePlanes, spread_limit};
-use crate::transfer::RowBand;
-
-/// Inputs of the depth term.
-#[derive(Clone, Copy, Debug)]
-pub struct DepthProblem<'a> {
-    /// Current inverse depth.
-    pub current: &'a InverseDepthMap<'a>,
-    /// Inverse depth of the keyframe.
-    pub keyframe: &'a InverseDepthMap<'a>,
-    /// Surface planes of the keyframe.
-    pub planes: &'a SurfacePlanes<'a>,
-    /// Camera of the maps' pyramid level.
-    pub camera: PinholeCamera,
-    /// Step between the pixels of the current map that take part.
-    pub stride: usize,
-    /// Residuals beyond this many 1/m belong to another surface: they cost as much as one at the gate and pull
-    /// nowhere.
-    pub gate: f32,
-    /// Rows of the current map that take part: those that were measured at the pose in question.
-    pub band: RowBand,
-}
-
-/// Sums of the depth term for the mid pose, tangent (translation, left rotation) in the keyframe.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DepthSums {
-    /// Robust cost in squared standard deviations.
-    pub cost: f64,
-    /// Number of compared points within the gate.
-    pub points: f64,
-    /// Number of compared points beyond the gate.
-    pub gated: f64,
-    /// Gauss-Newton matrix.
-    pub hessian: Matrix6<f64>,
-    /// Gradient.
-    pub gradient: Vector6<f64>,
-}
+use crate::geometry::RigidTransform;
+use crate::surface::spread_limit;
 
 impl DepthProblem<'_> {
     /// Robust standard deviation of the residuals at `keyframe_from_camera`, 1/m, and the number of points behind

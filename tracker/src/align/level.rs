@@ -5,9 +5,10 @@ use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 use super::damping::Damping;
 use super::measure::{NOMINAL_PHOTON_VARIANCE, measure_depth, measure_photometric, nominal_model};
-use super::objective::{AlignScratch, FrameData, Linearised, Objective, ReferenceData};
+use super::objective::Linearised;
 use super::placement::{blur_length, place_sites};
 use super::prior::MotionPrior;
+use super::problem::{AlignScratch, FrameData, Objective, ReferenceData};
 use super::{AlignSettings, BOWED_UNKNOWNS, Estimate, UNKNOWNS};
 use crate::geometry::PinholeCamera;
 use crate::keyframe::typical_inverse_depth;

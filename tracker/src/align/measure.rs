@@ -1,7 +1,7 @@
 //! Noise scales and outliers at the current estimate, before a linearisation.
 
 use super::depth_term::{DepthProblem, gate_for, noise_of};
-use super::objective::{AlignScratch, DepthPart, Objective};
+use super::problem::{AlignScratch, DepthPart, Objective};
 use super::scale::median;
 use super::{AlignSettings, Estimate};
 use crate::transfer::{self, PatchCost, ResidualModel, RowBand};

@@ -11,6 +11,7 @@
 mod bands;
 mod damping;
 mod depth_accumulate;
+mod depth_problem;
 mod depth_samples;
 pub mod depth_term;
 mod level;
@@ -18,13 +19,14 @@ mod measure;
 mod objective;
 mod placement;
 mod prior;
+mod problem;
 mod scale;
 mod settings;
 
 pub use level::{Alignment, LevelOutcome, LevelPlan, StopReason};
-pub use objective::{AlignScratch, FrameData, ReferenceData};
-pub use placement::{MAX_BANDS, blur_length, place_sites};
+pub use placement::{blur_length, place_sites};
 pub use prior::{FollowsCentre, MotionPrior};
+pub use problem::{AlignScratch, FrameData, ReferenceData};
 pub use settings::AlignSettings;
 
 use nalgebra::{SVector, Vector6};

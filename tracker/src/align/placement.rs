@@ -3,16 +3,13 @@
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Vector3};
 
-use super::objective::FrameData;
+use super::problem::FrameData;
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::keyframe::Keypoint;
 use crate::math::{round_half_up_to_i32, sqrt_f32};
 use crate::surface::spread_limit;
 use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
-use crate::transfer::{PATTERN_RADIUS, PatchSite, RowBand};
-
-/// Most bands of rows that a frame is divided into.
-pub const MAX_BANDS: usize = 16;
+use crate::transfer::{MAX_BANDS, PATTERN_RADIUS, PatchSite, RowBand};
 
 /// `camera_from_keyframe` in single precision.
 #[derive(Clone, Copy)]

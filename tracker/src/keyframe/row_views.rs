@@ -3,9 +3,9 @@
 use arrayvec::ArrayVec;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::align::MAX_BANDS;
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::trajectory::BowedTrajectory;
+use crate::transfer::MAX_BANDS;
 
 /// `camera_from_keyframe` at one time, in single precision.
 #[derive(Clone, Copy)]

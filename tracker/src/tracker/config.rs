@@ -1,7 +1,7 @@
 //! Configuration and memory plan.
 
 use super::frame::Frame;
-use crate::align::{AlignSettings, MAX_BANDS};
+use crate::align::AlignSettings;
 use crate::deblur::DeblurScratch;
 use crate::error::ConfigError;
 use crate::geometry::PinholeCamera;
@@ -9,7 +9,7 @@ use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
 use crate::keyframe::{Keyframe, MAX_KEYPOINTS, RectifyScratch};
 use crate::photometric::{InverseResponse, Vignetting};
 use crate::trajectory::FrameTiming;
-use crate::transfer::{PatchCost, PatchSite};
+use crate::transfer::{MAX_BANDS, PatchCost, PatchSite};
 use crate::workspace::{ARENA_ALIGNMENT, slice_bytes};
 
 /// Where the sharp reference comes from.

@@ -7,10 +7,10 @@
 use fearless_simd::prelude::*;
 use nalgebra::{SMatrix, SVector};
 
-use super::evaluate::{PatchCost, ResidualModel, RowSums};
 use super::kernel::{load, store};
 use super::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 use super::problem::{BrightnessModel, LevelImage, PatchRows, PatchSite, PatchValues};
+use super::sums::{PatchCost, ResidualModel, RowSums};
 
 /// Vectors of a patch when a vector has the least number of lanes, four.
 const MAX_VECTORS: usize = PATCH_PIXELS / 4;

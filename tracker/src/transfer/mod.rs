@@ -11,11 +11,11 @@ mod pattern;
 mod pixel;
 mod problem;
 pub mod reference;
+mod sums;
 mod virtual_view;
 
 pub use evaluate::{
-    BowedSums, PatchCost, PhotometricSums, ResidualModel, TransferParts, accumulate_rows, evaluate_cost,
-    huber, linearize, linearize_bowed, transfer_rows, transfer_values,
+    TransferParts, accumulate_rows, evaluate_cost, linearize, linearize_bowed, transfer_rows, transfer_values,
 };
 pub use pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 pub use pixel::{TransferredPixel, transfer_pixel};
@@ -23,4 +23,5 @@ pub use problem::{
     BOWED_PATH, BOWED_ROW_LENGTH, BrightnessModel, LINEAR_PATH, PatchRows, PatchSite, PatchValues,
     ROW_LENGTH, RowTimes, TransferProblem,
 };
-pub use virtual_view::{MAX_VIRTUAL_VIEWS, RowBand, VirtualView, virtual_views};
+pub use sums::{BowedSums, PatchCost, PhotometricSums, ResidualModel, huber};
+pub use virtual_view::{MAX_BANDS, MAX_VIRTUAL_VIEWS, RowBand, VirtualView, virtual_views};

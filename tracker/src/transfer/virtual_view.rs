@@ -100,6 +100,9 @@ fn single(v: &Vector3<f64>) -> [f32; 3] {
     [v.x as f32, v.y as f32, v.z as f32]
 }
 
+/// Most bands of rows that a frame is divided into.
+pub const MAX_BANDS: usize = 16;
+
 /// A band of rows of the current image that shares its virtual views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RowBand {

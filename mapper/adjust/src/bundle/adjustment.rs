@@ -1,0 +1,425 @@
+//! Joint optimisation of the map and of the paths of all exposures.
+
+use mba_map::map::{MapKind, Scene, SceneRenderer};
+use mba_raster::losses::{Exposure, LossTerms};
+use mba_raster::sensor::{Observation, ObservationPyramid, Sensor};
+use mba_tracker::geometry::RigidTransform;
+use mba_tracker::simd::Level;
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+use serde::{Deserialize, Serialize};
+
+use super::frame_state::FrameState;
+use super::map_model::{FitContext, MapModel};
+use super::path_metric::PathMetric;
+use super::path_step::{PathPrior, PathStep};
+use super::rectified::seen_at_once;
+use super::scene_map::SceneMap;
+use super::schedule::{Schedule, StepPlan};
+use super::seed_view::{DepthSource, SeedView};
+use super::seeding;
+use crate::deblurring::Reblurred;
+
+/// How the bundle is adjusted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BundleSettings {
+    /// What the map consists of.
+    pub kind: MapKind,
+    /// Whether motion during the exposure is modelled.
+    pub blur: bool,
+    /// Upper bound of virtual views per exposure.
+    pub max_views: usize,
+    /// Upper bound of the number of Gaussians.
+    pub max_gaussians: usize,
+    /// Seed of the order in which keyframes are visited, and of what is random in the map.
+    pub seed: u64,
+}
+
+/// A frame that the map is fitted to.
+#[derive(Clone, Debug)]
+pub struct Keyframe {
+    /// Index in the data set.
+    pub index: usize,
+    /// What was captured.
+    pub observation: ObservationPyramid,
+    /// What is known of its path besides.
+    pub prior: PathPrior,
+    /// Typical depth, metres.
+    pub depth: f64,
+    /// Coordinates of its path.
+    pub metric: PathMetric,
+}
+
+impl Keyframe {
+    /// Frame `index` of the data set.
+    #[must_use]
+    pub fn new(index: usize, observation: ObservationPyramid, prior: PathPrior) -> Self {
+        let depth = typical_depth(observation.level(0));
+        let metric = PathMetric::new(observation.level(1), depth);
+        Self { index, observation, prior, depth, metric }
+    }
+}
+
+/// All that changes from step to step: enough to go on after an interruption.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BundleState<M = SceneMap> {
+    /// The map.
+    pub map: M,
+    /// One per keyframe.
+    pub frames: Vec<FrameState>,
+    /// Steps made.
+    pub steps: usize,
+    /// Those of the schedule.
+    pub scheduled_steps: usize,
+    /// Where the schedule stands, 0 to 1.
+    pub position: f64,
+}
+
+/// A map, keyframes, and what is needed to fit the one to the other.
+#[derive(Debug)]
+pub struct BundleAdjustment<M: MapModel = SceneMap> {
+    /// What was estimated so far.
+    pub state: BundleState<M>,
+    pub(super) keyframes: Vec<Keyframe>,
+    settings: BundleSettings,
+    schedule: Schedule,
+    sensor: Sensor,
+    renderer: SceneRenderer,
+    context: M::Context,
+    /// Order of the visits of the current round, and which round that is.
+    round: (usize, Vec<usize>),
+}
+
+/// What a step did.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// The keyframe, counted from 0.
+    pub keyframe: usize,
+    /// Virtual views of a pixel that were rendered.
+    pub views: usize,
+    /// Loss before the step.
+    pub terms: LossTerms,
+}
+
+/// Blur up to this length, pixels, is not seen in a picture: one view shows it.
+const SHARP_PX: f64 = 1.0;
+
+/// Frames that are no keyframes are fitted with numbers of draws from here on, which no step has.
+const FITS_FROM: u64 = 1 << 40;
+
+impl BundleAdjustment {
+    /// Keyframes of one sensor with first estimates of their states, and an empty map; [`Self::seed`] fills it.
+    ///
+    /// Keyframes without a state are left out.
+    #[must_use]
+    pub fn new(
+        level: Level,
+        sensor: Sensor,
+        settings: BundleSettings,
+        keyframes: Vec<Keyframe>,
+        frames: Vec<FrameState>,
+    ) -> Self {
+        let map = SceneMap::new(settings.kind, settings.seed);
+        let context = FitContext::new(level, sensor.clone());
+        let schedule = Schedule::of(settings.kind, keyframes.len());
+        let frames = keyframes.into_iter().zip(frames).collect();
+        Self::with_map((map, context), schedule, level, sensor, settings, frames)
+    }
+}
+
+impl<M: MapModel> BundleAdjustment<M> {
+    /// Keyframes of one sensor with first estimates of their states, and an empty map of any kind with what it works with;
+    /// [`Self::seed`] fills it.
+    #[must_use]
+    pub fn with_map(
+        (map, context): (M, M::Context),
+        schedule: Schedule,
+        level: Level,
+        sensor: Sensor,
+        settings: BundleSettings,
+        frames: Vec<(Keyframe, FrameState)>,
+    ) -> Self {
+        let (keyframes, frames) = frames.into_iter().unzip();
+        let state = BundleState { map, frames, steps: 0, scheduled_steps: 0, position: 0.0 };
+        let (renderer, round) = (SceneRenderer::new(level), (usize::MAX, Vec::new()));
+        Self { state, keyframes, settings, schedule, sensor, renderer, context, round }
+    }
+
+    /// The keyframes.
+    #[must_use]
+    pub fn keyframes(&self) -> &[Keyframe] {
+        &self.keyframes
+    }
+
+    /// The sensor.
+    #[must_use]
+    pub fn sensor(&self) -> &Sensor {
+        &self.sensor
+    }
+
+    /// The schedule.
+    #[must_use]
+    pub fn schedule(&self) -> &Schedule {
+        &self.schedule
+    }
+
+    /// Adds a keyframe with a first estimate of its state, the last in order.
+    pub fn push(&mut self, keyframe: Keyframe, frame: FrameState) {
+        self.keyframes.push(keyframe);
+        self.state.frames.push(frame);
+    }
+
+    /// Takes keyframe `k` out; what the map learnt from it stays. Returns `None` if there is no such keyframe.
+    pub fn remove_keyframe(&mut self, k: usize) -> Option<(Keyframe, FrameState)> {
+        let both = k < self.keyframes.len().min(self.state.frames.len());
+        both.then(|| (self.keyframes.remove(k), self.state.frames.remove(k)))
+    }
+
+    /// What is known of the path of keyframe `k` besides its picture.
+    pub fn set_prior(&mut self, k: usize, prior: PathPrior) {
+        if let Some(keyframe) = self.keyframes.get_mut(k) {
+            keyframe.prior = prior;
+        }
+    }
+
+    /// Starts another schedule at its beginning.
+    pub fn set_schedule(&mut self, schedule: Schedule) {
+        self.schedule = schedule;
+        (self.state.scheduled_steps, self.state.position) = (0, 0.0);
+    }
+
+    /// Allows up to so many Gaussians from now on.
+    pub fn set_max_gaussians(&mut self, max_gaussians: usize) {
+        self.settings.max_gaussians = max_gaussians;
+    }
+
+    /// Most Gaussians.
+    #[must_use]
+    pub fn max_gaussians(&self) -> usize {
+        self.settings.max_gaussians
+    }
+
+    /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,
+    /// once more, surfaces that no keyframe has a depth of.
+    pub fn seed(&mut self) {
+        let mut order: Vec<usize> = (0..self.keyframes.len()).collect();
+        order.sort_by(|a, b| self.blur_px(*a).total_cmp(&self.blur_px(*b)));
+        for source in [DepthSource::Measured, DepthSource::Completed] {
+            for &k in &order {
+                self.seed_from(k, source);
+            }
+        }
+        self.state.map.reorder();
+    }
+
+    /// Adds what keyframe `k` sees and the map does not cover.
+    pub fn seed_from(&mut self, k: usize, source: DepthSource) {
+        let FrameState { path, log_gain, .. } = &self.state.frames[k];
+        let (world_from_camera, gain) = (path.mid(), log_gain.exp() as f32);
+        let Keyframe { index, observation, .. } = &self.keyframes[k];
+        let seen = seen_at_once(observation.level(0), path);
+        let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
+        self.state.map.seed(&mut self.context, &view, self.settings.max_gaussians);
+    }
+
+    /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
+    pub fn uncovered_fraction(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
+        let Self { renderer, sensor, .. } = self;
+        renderer.render(self.state.map.scene(), sensor.camera.at_level(level), world_from_camera);
+        let alpha = &renderer.image.alpha;
+        let open = alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
+        open as f64 / alpha.len().max(1) as f64
+    }
+
+    /// Number of virtual views of a pixel that a step with `plan` on keyframe `k` renders.
+    #[must_use]
+    pub fn views(&self, k: usize, plan: &StepPlan) -> usize {
+        self.settings.view_count(&self.keyframes[k], &self.state.frames[k], plan).per_pixel
+    }
+
+    /// One step on the next keyframe, after which the schedule stands at `position_after`. `timed` says whether
+    /// positions are shares of time.
+    ///
+    /// Returns `None` without keyframes.
+    pub fn step(&mut self, timed: bool, position_after: impl FnOnce(&Schedule) -> f64) -> Option<StepReport> {
+        let k = self.next_keyframe()?;
+        let plan = self.schedule.plan(self.state.position, timed);
+        let report = self.visit(k, &plan);
+        self.state.scheduled_steps += 1;
+        let before = core::mem::replace(&mut self.state.position, position_after(&self.schedule));
+        if self.schedule.density_changes(before, self.state.position) {
+            self.change_density();
+        }
+        Some(report)
+    }
+
+    /// One step on keyframe `k`, which must be one.
+    pub fn visit(&mut self, k: usize, plan: &StepPlan) -> StepReport {
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let seen = keyframe.observation.level(plan.level);
+        let count = self.settings.view_count(keyframe, frame, plan);
+        let views = count.of_row;
+        let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
+        let draw = self.state.steps as u64;
+        let loss = self.state.map.evaluate(&mut self.context, exposure, plan, draw);
+
+        let BundleState { map, frames, steps, .. } = &mut self.state;
+        map.step(&mut self.context, plan);
+        let frame = &mut frames[k];
+        // The first keyframe says where the world is and how bright.
+        let is_first = k == 0;
+        if plan.path_pixels > 0.0 {
+            // One view says nothing about the motion.
+            let still = !self.settings.blur || count.still;
+            let hold = [is_first || plan.only_motions, still, still || plan.only_motions];
+            let step = PathStep { pixels: plan.path_pixels, hold };
+            frame.path_moments.step(
+                &mut frame.path,
+                &loss.grad_path,
+                &keyframe.prior,
+                &keyframe.metric,
+                step,
+            );
+            if !is_first {
+                frame.log_gain += frame.gain_moments.step(loss.grad_log_gain, plan.log_gain);
+            }
+        }
+        frame.visits += 1;
+        *steps += 1;
+        StepReport { keyframe: k, views: count.per_pixel, terms: loss.terms }
+    }
+
+    /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution, of
+    /// which the one with the least loss is kept: steps have a length of their own, and would lead away from a path
+    /// that is right already.
+    pub fn fit_frame(&mut self, unmapped: &Keyframe, frame: &mut FrameState, count: usize) {
+        let plan = StepPlan { level: 1, spacing: 2.0, path_pixels: 0.3, ..self.schedule.plan(0.1, false) };
+        // The same pixels at every step: their losses can be compared.
+        let draw = FITS_FROM + unmapped.index as u64;
+        let seen = unmapped.observation.level(plan.level);
+        let (mut best, mut least) = (frame.clone(), f64::INFINITY);
+        for k in 0..count {
+            let shrink = 0.05_f64.powf(k as f64 / count as f64);
+            let views = self.settings.view_count(unmapped, frame, &plan).of_row;
+            let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
+            let loss = self.state.map.evaluate(&mut self.context, exposure, &plan, draw);
+            if loss.terms.total() < least {
+                (best, least) = (frame.clone(), loss.terms.total());
+            }
+            let still = !self.settings.blur;
+            let step = PathStep { pixels: plan.path_pixels * shrink, hold: [false, still, still] };
+            frame.path_moments.step(
+                &mut frame.path,
+                &loss.grad_path,
+                &unmapped.prior,
+                &unmapped.metric,
+                step,
+            );
+            frame.log_gain += frame.gain_moments.step(loss.grad_log_gain, 0.01 * shrink);
+        }
+        *frame = best;
+    }
+
+    /// The next keyframe of a random order in which every keyframe comes once per round.
+    fn next_keyframe(&mut self) -> Option<usize> {
+        let count = self.keyframes.len().min(self.state.frames.len());
+        let (round, place) = (self.state.steps.checked_div(count)?, self.state.steps % count);
+        if self.round.0 != round {
+            self.round = (round, shuffled(count, self.settings.seed, round));
+        }
+        self.round.1.get(place).copied()
+    }
+
+    /// Puts detail where it is missing and removes what is useless.
+    pub fn change_density(&mut self) {
+        self.state.map.change_density(self.settings.max_gaussians);
+    }
+
+    /// Length of the blur of keyframe `k`, full-resolution pixels.
+    #[must_use]
+    pub fn blur_px(&self, k: usize) -> f64 {
+        let keyframe = &self.keyframes[k];
+        let exposure = keyframe.observation.level(0).times.exposure;
+        self.state.frames[k].blur_px(&self.sensor.camera, keyframe.depth, exposure)
+    }
+}
+
+impl BundleAdjustment {
+    /// The picture of keyframe `k` as the map explains it, with its blur and its rows, in light as bright as captured; none of
+    /// a field, whose virtual views take half a second each.
+    #[must_use]
+    pub fn explained(&mut self, k: usize) -> Option<Reblurred> {
+        let Scene::Gaussians(gaussians) = self.state.map.scene() else { return None };
+        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let seen = keyframe.observation.level(0);
+        let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
+        let views = self.settings.view_count(keyframe, frame, &plan).of_row;
+        let gain = frame.log_gain.exp() as f32;
+        let image = self
+            .context
+            .gaussian_loss
+            .render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
+        let as_captured = |plane: &Vec<f32>| match &seen.falloff {
+            Some(falloff) => {
+                plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()
+            }
+            None => plane.iter().map(|light| gain * light).collect(),
+        };
+        Some(Reblurred { light: image.colour.each_ref().map(as_captured), alpha: image.alpha.clone() })
+    }
+}
+
+/// Virtual views of a picture.
+struct ViewCount {
+    /// Of the exposure of one row.
+    of_row: usize,
+    /// That a pixel is rendered in: neighbours in time have a part in a row, and depth may have its own.
+    per_pixel: usize,
+    /// Whether the picture says nothing about a motion.
+    still: bool,
+}
+
+impl BundleSettings {
+    /// Virtual views of a frame for a step with `plan`.
+    fn view_count(&self, keyframe: &Keyframe, frame: &FrameState, plan: &StepPlan) -> ViewCount {
+        let Observation { camera, times, .. } = keyframe.observation.level(plan.level);
+        let blur_px = frame.blur_px(camera, keyframe.depth, times.exposure);
+        let views = self.views(blur_px, plan);
+        if times.is_global() {
+            return ViewCount { of_row: views, per_pixel: views, still: views == 1 };
+        }
+        // What is sharp in every row may still lean.
+        let sweep_px = frame.blur_px(camera, keyframe.depth, times.exposure + times.readout.abs());
+        ViewCount { of_row: views, per_pixel: views + 2, still: views == 1 && sweep_px <= SHARP_PX }
+    }
+
+    /// Number of virtual views for a blur length in pixels of the plan's resolution; odd.
+    fn views(&self, blur_px: f64, plan: &StepPlan) -> usize {
+        let most = if self.blur { plan.max_views.min(self.max_views) } else { 1 };
+        // Casts saturate. An even bound gives the odd number below.
+        let least = if blur_px > SHARP_PX { 3 } else { 1 };
+        let wanted = ((blur_px / plan.spacing).ceil() as usize).max(least) | 1;
+        wanted.min(most.saturating_sub(1) | 1)
+    }
+}
+
+/// Typical depth of an observation, metres; 2 where nothing was measured.
+fn typical_depth(seen: &Observation) -> f64 {
+    let mut depths: Vec<f32> = seen.depth.iter().copied().filter(|depth| *depth > 0.0).step_by(7).collect();
+    if depths.is_empty() {
+        return 2.0;
+    }
+    let middle = depths.len() / 2;
+    f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+/// The numbers below `count` in an order that depends on seed and round only (Fisher and Yates 1938).
+fn shuffled(count: usize, seed: u64, round: usize) -> Vec<usize> {
+    let mut random = Pcg32::new(seed, round as u64);
+    let mut order: Vec<usize> = (0..count).collect();
+    for k in (1..count).rev() {
+        let other = (u64::from(random.next_u32()) * (k as u64 + 1)) >> 32;
+        order.swap(k, other as usize);
+    }
+    order
+}

@@ -1,0 +1,492 @@
+//! An opened data set: a list of frames that are decoded on demand.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use mba_tracker::geometry::PinholeCamera;
+use mba_tracker::image::{
+    PixelRectangle, SourcePosition, fill_source_map, region_with_source, remap_bilinear, remap_nearest,
+};
+use mba_tracker::photometric::{Vignetting, radius_squared};
+
+use super::calibration::{
+    ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, assumed_exposure_seconds, check_exposure,
+};
+use super::frame::{image_size, read_colour, read_depth};
+use super::vignetting::{falloff_of_frames, falloff_of_pixels};
+use super::{
+    Calibration, CameraFact, DatasetError, ExposureSource, FrameError, InvalidValue, Knowledge, RgbdFrame,
+    Warning,
+};
+use crate::imu::{self, ImuRecording};
+use crate::trajectory_file::{TimedExposure, TimedPose};
+
+/// An RGB-D sequence with calibration and, where recorded, ground truth. Images stay on disk until asked for.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    folder: PathBuf,
+    name: String,
+    calibration: Calibration,
+    /// As in [`Contents`].
+    colour_camera: Option<PinholeCamera>,
+    entries: Vec<FrameEntry>,
+    ground_truth: Vec<TimedPose>,
+    ground_truth_exposures: Vec<TimedExposure>,
+    imu: Option<ImuRecording>,
+    /// Of the reader; those about times follow from calibration and entries.
+    reader_warnings: Vec<Warning>,
+    warnings: Vec<Warning>,
+    colour: ImageSource,
+    depth: ImageSource,
+    region: PixelRectangle,
+}
+
+/// Where one frame is stored.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct FrameEntry {
+    /// Mid exposure, seconds.
+    pub(super) timestamp: f64,
+    /// That of the depth image itself, seconds; that of colour where it has none.
+    pub(super) depth_timestamp: f64,
+    pub(super) colour: PathBuf,
+    pub(super) depth: PathBuf,
+    /// Exposure time recorded for this very frame, seconds.
+    pub(super) exposure_seconds: Option<f64>,
+}
+
+/// What a reader finds in a folder.
+pub(super) struct Contents {
+    pub(super) calibration: Calibration,
+    /// Camera of the colour images if it is not the one of the calibration (which the depth images have).
+    pub(super) colour_camera: Option<PinholeCamera>,
+    pub(super) entries: Vec<FrameEntry>,
+    pub(super) ground_truth: Vec<TimedPose>,
+    pub(super) ground_truth_exposures: Vec<TimedExposure>,
+    pub(super) warnings: Vec<Warning>,
+}
+
+/// Size of the stored images and, unless they are used as they are, how to resample them.
+#[derive(Clone, Debug)]
+struct ImageSource {
+    size: (usize, usize),
+    map: Option<Vec<SourcePosition>>,
+    /// Whether there was any image when the data set was opened. Without one the size is a mere claim, for which no map is
+    /// made.
+    is_there: bool,
+}
+
+impl Dataset {
+    /// Prepares undistortion and checks what can be checked without decoding images.
+    pub(super) fn new(folder: &Path, contents: Contents) -> Result<Self, DatasetError> {
+        let Contents { calibration, colour_camera, entries, ground_truth, ground_truth_exposures, warnings } =
+            contents;
+        let camera = calibration.camera;
+        let captured = colour_camera.unwrap_or(camera);
+        // Before the maps: their memory follows from sizes that may be wrong.
+        let has_colour = check_first_size(entries.iter().map(|entry| &entry.colour), size(&captured))?;
+        let has_depth = check_first_size(entries.iter().map(|entry| &entry.depth), size(&camera))?;
+        let colour = ImageSource::new(&calibration, &captured, has_colour);
+        let depth = ImageSource::new(&calibration, &camera, has_depth);
+        let whole = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
+        let region = colour.map.as_ref().map_or(whole, |map| region_with_source(map, camera.width));
+        let mut dataset = Self {
+            name: folder_name(folder),
+            folder: folder.to_owned(),
+            calibration,
+            colour_camera,
+            entries,
+            ground_truth,
+            ground_truth_exposures,
+            imu: None,
+            reader_warnings: warnings,
+            warnings: Vec::new(),
+            colour,
+            depth,
+            region,
+        };
+        dataset.collect_warnings();
+        Ok(dataset)
+    }
+
+    /// The same recording as another calibration describes it: undistortion, times and the axes of the IMU follow
+    /// from it. Exposure times of single frames are kept if it has them per frame, and dropped otherwise.
+    ///
+    /// # Errors
+    ///
+    /// [`DatasetError::InvalidCalibration`] for absurd values and for an exposure per frame where the frames have
+    /// none, [`DatasetError::SizeMismatch`] if the images have another size.
+    pub fn with_calibration(self, calibration: Calibration) -> Result<Self, DatasetError> {
+        calibration.check()?;
+        let is_per_frame = calibration.exposure == ExposureSource::PerFrame;
+        let mut entries = self.entries;
+        if is_per_frame && entries.iter().any(|entry| entry.exposure_seconds.is_none()) {
+            return Err(DatasetError::InvalidCalibration(InvalidValue {
+                key: "exposure_seconds",
+                value: "per frame".to_owned(),
+                expected: "one number, as there is none for each frame",
+            }));
+        }
+        if !is_per_frame {
+            entries.iter_mut().for_each(|entry| entry.exposure_seconds = None);
+        }
+        let contents = Contents {
+            calibration,
+            colour_camera: self.colour_camera,
+            entries,
+            ground_truth: self.ground_truth,
+            ground_truth_exposures: self.ground_truth_exposures,
+            warnings: self.reader_warnings,
+        };
+        Self::new(&self.folder, contents)
+    }
+
+    /// Replaces the exposure times of all frames by estimates, seconds, one for each frame.
+    ///
+    /// # Errors
+    ///
+    /// [`DatasetError::ExposureCount`], [`DatasetError::InvalidCalibration`] for a time that no shutter has; then
+    /// nothing changes.
+    pub fn set_exposures(&mut self, seconds: Vec<f64>) -> Result<(), DatasetError> {
+        let (found, frames) = (seconds.len(), self.entries.len());
+        if found != frames {
+            return Err(DatasetError::ExposureCount { found, frames });
+        }
+        seconds.iter().try_for_each(|seconds| check_exposure(*seconds))?;
+        for (entry, seconds) in self.entries.iter_mut().zip(seconds) {
+            entry.exposure_seconds = Some(seconds);
+        }
+        self.calibration.exposure = ExposureSource::PerFrame;
+        self.calibration.sources.exposure = Knowledge::Estimated;
+        self.collect_warnings();
+        Ok(())
+    }
+
+    /// Name of the data set: its folder's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Folder of the data set.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// Number of frames, at least 1.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Whether there are no frames; never the case for an opened data set.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
+    /// What is known about the camera.
+    #[must_use]
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// Whether there was any colour and any depth image when the data set was opened. If not, no frame can be read, and
+    /// the size in the calibration is a mere claim.
+    #[must_use]
+    pub fn has_images(&self) -> bool {
+        self.colour.is_there && self.depth.is_there
+    }
+
+    /// The rectangle of each frame in which every pixel stems from the stored image; smaller than the frame only
+    /// where undistortion leaves black borders, which must not be taken for edges.
+    #[must_use]
+    pub fn region_with_source(&self) -> PixelRectangle {
+        self.region
+    }
+
+    /// Mid exposure of the middle of frame `index` in seconds, increasing with the index.
+    ///
+    /// # Panics
+    ///
+    /// If `index` is not below [`Self::len`].
+    #[must_use]
+    pub fn timestamp(&self, index: usize) -> f64 {
+        self.entries[index].timestamp
+    }
+
+    /// When the depth of frame `index` was measured, seconds: by the delay of the calibration, else by the depth
+    /// image's own timestamp, else that of colour.
+    ///
+    /// # Panics
+    ///
+    /// If `index` is not below [`Self::len`].
+    #[must_use]
+    pub fn depth_timestamp(&self, index: usize) -> f64 {
+        self.entry_depth_timestamp(&self.entries[index])
+    }
+
+    /// Time the shutter was open for frame `index`, seconds: recorded for the frame, else for the camera, else
+    /// assumed (see [`ExposureSource`]).
+    ///
+    /// # Panics
+    ///
+    /// If `index` is not below [`Self::len`].
+    #[must_use]
+    pub fn exposure_seconds(&self, index: usize) -> f64 {
+        self.entry_exposure(&self.entries[index])
+    }
+
+    /// Reads, decodes and undistorts frame `index`.
+    ///
+    /// Colour is interpolated bilinearly, depth takes the nearest stored pixel.
+    ///
+    /// # Errors
+    ///
+    /// [`FrameError`] if one of the images is missing, damaged or of the wrong size or type, or the index out of
+    /// range. Other frames may be fine: skip this one and count it.
+    pub fn frame(&self, index: usize) -> Result<RgbdFrame, FrameError> {
+        let len = self.entries.len();
+        let entry = self.entries.get(index).ok_or(FrameError::IndexOutOfRange { index, len })?;
+        let rgb = self.colour.undistort_colour(read_colour(&entry.colour, self.colour.size)?);
+        let depth = self.depth.undistort_depth(read_depth(&entry.depth, self.depth.size)?);
+        self.colour.check(&entry.colour)?;
+        self.depth.check(&entry.depth)?;
+        Ok(RgbdFrame {
+            index,
+            timestamp: entry.timestamp,
+            depth_timestamp: self.entry_depth_timestamp(entry),
+            exposure_seconds: self.entry_exposure(entry),
+            width: self.calibration.camera.width,
+            height: self.calibration.camera.height,
+            rgb,
+            depth,
+        })
+    }
+
+    /// Recorded poses at mid exposure, increasing in time; empty if there are none. Their times need not be
+    /// those of the frames.
+    #[must_use]
+    pub fn ground_truth(&self) -> &[TimedPose] {
+        &self.ground_truth
+    }
+
+    /// Recorded poses at opening, mid exposure and closing; empty if there are none.
+    #[must_use]
+    pub fn ground_truth_exposures(&self) -> &[TimedExposure] {
+        &self.ground_truth_exposures
+    }
+
+    /// What the IMU recorded, in the axes of the camera, if there was one and its file is good.
+    #[must_use]
+    pub fn imu(&self) -> Option<&ImuRecording> {
+        self.imu.as_ref()
+    }
+
+    /// The share of light that the lens lets through to each pixel of the frames, row by row, from 0 to about 1;
+    /// none for a lens without fall-off. Undistortion is taken into account: the fall-off is that of the stored image.
+    #[must_use]
+    pub fn light_falloff(&self) -> Option<Vec<f32>> {
+        let Calibration { vignetting, camera, .. } = &self.calibration;
+        let source = self.colour.map.as_deref();
+        (self.colour.is_there && !vignetting.is_none())
+            .then(|| falloff_of_pixels(vignetting, camera, self.colour.size, source))
+    }
+
+    /// Squared distance of a pixel of the frames from the middle of the stored image, where it is 1 in the corners. A pixel
+    /// outside of the frames counts as the nearest inside.
+    pub fn stored_radius_squared(&self, u: f64, v: f64) -> f64 {
+        let PinholeCamera { width, height, .. } = self.calibration.camera;
+        let nearest = |pixel: f64, side: usize| pixel.round().clamp(0.0, side as f64 - 1.0) as usize;
+        let place = match self.colour.map.as_deref() {
+            Some(map) => map[nearest(v, height) * width + nearest(u, width)].map(f64::from),
+            None => [u, v],
+        };
+        radius_squared(self.colour.size.0, self.colour.size.1, place[0], place[1])
+    }
+
+    /// The fall-off of light over the frames as a polynomial of the distance from their middle: that of the calibration, for
+    /// frames without the distortion of the stored image the nearest one.
+    #[must_use]
+    pub fn vignetting(&self) -> Vignetting {
+        let Calibration { vignetting, camera, .. } = &self.calibration;
+        falloff_of_frames(vignetting, camera, self.colour.size, self.colour.map.as_deref())
+    }
+
+    /// Whatever is odd about the data set.
+    #[must_use]
+    pub fn warnings(&self) -> &[Warning] {
+        &self.warnings
+    }
+
+    fn entry_exposure(&self, entry: &FrameEntry) -> f64 {
+        entry.exposure_seconds.unwrap_or(self.calibration.fallback_exposure_seconds())
+    }
+
+    fn entry_depth_timestamp(&self, entry: &FrameEntry) -> f64 {
+        let delayed = |delay| entry.timestamp + delay;
+        let by_its_clock = entry.depth_timestamp + self.calibration.depth_clock_seconds;
+        self.calibration.depth_delay_seconds.map_or(by_its_clock, delayed)
+    }
+
+    /// Finds again what is odd, and reads the IMU, whose axes the calibration decides.
+    fn collect_warnings(&mut self) {
+        let sources = self.calibration.sources;
+        let is_still_assumed = |fact: CameraFact| sources.of(fact) == Knowledge::Assumed;
+        let still_holds = |warning: &&Warning| match warning {
+            Warning::Assumed { key: "readout", .. } => is_still_assumed(CameraFact::Readout),
+            Warning::Assumed { key: "response", .. } => is_still_assumed(CameraFact::Response),
+            _ => true,
+        };
+        self.warnings = self.reader_warnings.iter().filter(still_holds).cloned().collect();
+        self.warn_about_timing();
+        self.warn_about_missing_images();
+        self.read_imu();
+    }
+
+    /// A damaged recording of the IMU is odd, but frames can do without.
+    fn read_imu(&mut self) {
+        match imu::read_folder(&self.folder, self.calibration.imu_from_camera.as_ref()) {
+            Ok(imu) => self.imu = imu,
+            Err(error) => self.warnings.push(Warning::ImuUnusable { problem: error.to_string() }),
+        }
+        let (first, last) = (self.entries.first(), self.entries.last());
+        if let (Some(imu), Some(first), Some(last)) = (&self.imu, first, last)
+            && !imu.overlaps(first.timestamp, last.timestamp)
+        {
+            self.warnings.push(Warning::ImuElsewhere);
+            self.imu = None;
+        }
+    }
+
+    fn warn_about_timing(&mut self) {
+        let frame_rate = self.calibration.frame_rate;
+        let interval = 1.0 / frame_rate;
+        let times: Vec<f64> = self.entries.iter().map(|entry| entry.timestamp).collect();
+        if let Some(measured) = frames_per_second(&times)
+            && !(0.5..=2.0).contains(&(measured / frame_rate))
+        {
+            self.warnings.push(Warning::FrameRateDiffers { frame_rate, measured });
+        }
+        self.warnings.extend(find_other_unit(&times));
+        self.warnings.extend(find_gaps(&times));
+        if let ExposureSource::Assumed { seconds } = self.calibration.exposure {
+            let why = if seconds < assumed_exposure_seconds(frame_rate) {
+                "every frame is taken for sharp".to_owned()
+            } else if seconds < LONGEST_ASSUMED_EXPOSURE {
+                format!("{ASSUMED_EXPOSURE_SHARE} of the frame interval")
+            } else {
+                "the longest that is assumed".to_owned()
+            };
+            let value = format!("{seconds:.4} s ({why})");
+            self.warnings.push(Warning::Assumed { key: "exposure_seconds", value });
+        }
+        let exposure = self.entries.iter().map(|entry| self.entry_exposure(entry)).fold(0.0, f64::max);
+        if exposure > interval * 1.001 {
+            self.warnings.push(Warning::ExposureTooLong { exposure, interval });
+        }
+    }
+
+    fn warn_about_missing_images(&mut self) {
+        let images = self.entries.iter().flat_map(|entry| [&entry.colour, &entry.depth]);
+        let mut missing = images.filter(|path| !path.is_file());
+        if let Some(first) = missing.next().cloned() {
+            self.warnings.push(Warning::MissingImages { count: 1 + missing.count(), first });
+        }
+    }
+}
+
+impl ImageSource {
+    fn new(calibration: &Calibration, captured: &PinholeCamera, is_there: bool) -> Self {
+        let ideal = &calibration.camera;
+        let size = size(captured);
+        if calibration.distortion.is_none() && captured == ideal || !is_there {
+            return Self { size, map: None, is_there };
+        }
+        let mut map = vec![[0.0; 2]; ideal.width * ideal.height];
+        let filled = fill_source_map(ideal, captured, &calibration.distortion, &mut map);
+        Self { size, map: filled.ok().map(|()| map), is_there }
+    }
+
+    /// Refuses images that have come since the data set was opened: there may be no map for them.
+    fn check(&self, path: &Path) -> Result<(), FrameError> {
+        if self.is_there || !path.is_file() {
+            return Ok(());
+        }
+        let reason = io::Error::other("no such image could be read when the data set was opened");
+        Err(FrameError::Unreadable { path: path.to_owned(), reason })
+    }
+
+    fn undistort_colour(&self, stored: Vec<u8>) -> Vec<u8> {
+        let Some(map) = &self.map else { return stored };
+        let mut target = vec![[0; 3]; map.len()];
+        let (pixels, _) = stored.as_chunks::<3>();
+        let mapped = remap_bilinear(pixels, self.size.0, self.size.1, map, &mut target);
+        debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
+        target.into_flattened()
+    }
+
+    fn undistort_depth(&self, stored: Vec<u16>) -> Vec<u16> {
+        let Some(map) = &self.map else { return stored };
+        let mut target = vec![0; map.len()];
+        let mapped = remap_nearest(&stored, self.size.0, self.size.1, map, &mut target);
+        debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
+        target
+    }
+}
+
+/// One over the median time between frames; none for a single frame.
+pub(super) fn frames_per_second(times: &[f64]) -> Option<f64> {
+    median_interval(times).map(|interval| 1.0 / interval)
+}
+
+fn median_interval(times: &[f64]) -> Option<f64> {
+    let mut intervals: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    intervals.sort_by(f64::total_cmp);
+    intervals.get(intervals.len() / 2).copied()
+}
+
+/// A median interval that is no video's in seconds, but one in another unit.
+fn find_other_unit(times: &[f64]) -> Option<Warning> {
+    // Every hundredth frame of a video is still read without a word.
+    const LONGEST_INTERVAL: f64 = 5.0;
+    let interval = median_interval(times).filter(|interval| *interval > LONGEST_INTERVAL)?;
+    let unit = match interval {
+        ..1e3 => "milliseconds",
+        ..1e6 => "microseconds",
+        _ => "nanoseconds",
+    };
+    Some(Warning::TimestampUnit { interval, unit })
+}
+
+/// Intervals of more than one and a half times the median.
+fn find_gaps(times: &[f64]) -> Option<Warning> {
+    let limit = 1.5 * median_interval(times)?;
+    let gaps = times.windows(2).map(|pair| (pair[1] - pair[0], pair[0])).filter(|(gap, _)| *gap > limit);
+    let (longest, after) = gaps.clone().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    Some(Warning::Gaps { count: gaps.count(), longest, after })
+}
+
+fn size(camera: &PinholeCamera) -> (usize, usize) {
+    (camera.width, camera.height)
+}
+
+/// Compares the first readable image with the calibration, so that a wrong calibration is found before any work; says
+/// whether there is one.
+fn check_first_size<'a>(
+    mut paths: impl Iterator<Item = &'a PathBuf>,
+    expected: (usize, usize),
+) -> Result<bool, DatasetError> {
+    match paths.find_map(|path| image_size(path).map(|found| (path, found))) {
+        Some((path, found)) if found != expected => {
+            Err(DatasetError::SizeMismatch { path: path.clone(), found, expected })
+        }
+        first => Ok(first.is_some()),
+    }
+}
+
+/// The folder's own name, also for paths such as `.` or `a/..`.
+fn folder_name(folder: &Path) -> String {
+    let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    absolute.file_name().map_or_else(|| "dataset".into(), |name| name.to_string_lossy().into_owned())
+}

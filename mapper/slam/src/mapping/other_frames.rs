@@ -1,0 +1,105 @@
+//! Frames between keyframes: fitted to the finished map.
+
+use mba_adjust::bundle::{BundleAdjustment, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
+use mba_io::dataset::Dataset;
+use mba_io::trajectory_file::TimedExposure;
+use mba_tracker::geometry::RigidTransform;
+
+use super::MapSettings;
+use super::observations::{observation, sensor};
+use super::prepare::Frames;
+use crate::run::FrameStatus;
+
+/// Steps per frame.
+const STEPS: usize = 24;
+
+/// Which frames between keyframes are fitted to the map; the others are moved along with the keyframes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fit {
+    /// All that were tracked.
+    Tracked,
+    /// Those without a pose that can be trusted: the others were tracked in the map's own world.
+    Doubtful,
+}
+
+impl Fit {
+    fn includes(self, status: FrameStatus) -> bool {
+        match self {
+            Self::Tracked => status != FrameStatus::Lost,
+            Self::Doubtful => status != FrameStatus::Ok,
+        }
+    }
+}
+
+/// Exposures and logarithms of the gains of all frames: those of keyframes as they were refined, those of the others
+/// starting from the tracked ones moved along with the keyframe next to them and, as `fit` says, fitted to the map. Frames
+/// that cannot be read are only moved along.
+pub(super) fn all_exposures(
+    dataset: &Dataset,
+    bundle: &mut BundleAdjustment,
+    frames: &Frames,
+    settings: &MapSettings,
+    fit: Fit,
+) -> Vec<(TimedExposure, f64)> {
+    let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
+    let sensor = sensor(dataset);
+    let mut all = Vec::with_capacity(dataset.len());
+    for index in 0..frames.exposures.len() {
+        let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
+        if keyframes[next] == index {
+            let state = &bundle.state.frames[next];
+            all.push((frames.exposure_of(index, state), state.log_gain));
+            continue;
+        }
+        let nearest = nearest(&keyframes, next, index);
+        let before = &frames.exposures[keyframes[nearest]].mid;
+        let reference = &bundle.state.frames[nearest];
+        let moved: RigidTransform = reference.path.mid().compose(&before.inverse());
+        let mut state = frames.state(index, settings);
+        state.path = state.path.seen_from(&moved);
+        state.log_gain = reference.log_gain;
+        if fit.includes(frames.records[index].status)
+            && let Ok(observation) = observation(dataset, &sensor, index)
+        {
+            let unmapped = Keyframe::new(
+                index,
+                observation,
+                PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },
+            );
+            let known = &bundle.keyframes()[nearest].observation;
+            let here = Placed { seen: unmapped.observation.level(1), world_from_camera: state.path.mid() };
+            let there =
+                Placed { seen: known.level(1), world_from_camera: bundle.state.frames[nearest].path.mid() };
+            if let Some(ratio) = log_brightness(&sensor.inverse_response, there, here)
+                && ratio.abs() > NOTICEABLE
+            {
+                state.log_gain += ratio;
+            }
+            bundle.fit_frame(&unmapped, &mut state, STEPS);
+        }
+        all.push((frames.exposure_of(index, &state), state.log_gain));
+    }
+    all
+}
+
+/// Which keyframe is nearest to frame `index`, `next` being the first after it.
+fn nearest(keyframes: &[usize], next: usize, index: usize) -> usize {
+    match next.checked_sub(1) {
+        Some(previous) if index - keyframes[previous] < keyframes[next].abs_diff(index) => previous,
+        _ => next,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_keyframe_may_be_on_either_side() {
+        let keyframes = [4, 10];
+        assert_eq!(nearest(&keyframes, 0, 1), 0);
+        assert_eq!(nearest(&keyframes, 1, 5), 0);
+        assert_eq!(nearest(&keyframes, 1, 9), 1);
+        assert_eq!(nearest(&keyframes, 1, 15), 1);
+    }
+}

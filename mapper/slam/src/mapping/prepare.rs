@@ -1,0 +1,254 @@
+//! From a run to a bundle that can be adjusted.
+
+use mba_adjust::bundle::{
+    BundleAdjustment, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness,
+};
+use mba_adjust::continuity::{ContinuitySettings, FrameVerdict, Suspicion, predict_motions};
+use mba_io::dataset::Dataset;
+use mba_io::statistics::quantile;
+use mba_io::trajectory_file::TimedExposure;
+use mba_raster::exposure::{ExposurePath, motion_of};
+use mba_raster::sensor::Sensor;
+use mba_tracker::SimdLevel;
+use nalgebra::Vector6;
+use rayon::prelude::*;
+
+use super::choice::choose_keyframes;
+use super::evidence::FrameEvidence;
+use super::observations::{observation, sensor};
+use super::run_continuity::{RepairedRun, repair_run, run_frames};
+use super::{MapError, MapSettings};
+use crate::run::{FrameRecord, FrameStatus, Run};
+
+/// Largest difference between the times of a frame in the run and in the data set, seconds.
+const SAME_TIME: f64 = 1e-4;
+
+/// What every frame of the data set starts with.
+pub(super) struct Frames {
+    /// Tracked exposures, repaired.
+    pub(super) exposures: Vec<TimedExposure>,
+    /// What was said of them when they were tracked.
+    pub(super) records: Vec<FrameRecord>,
+    /// First estimates of the paths over all the time in which anything of a frame was measured.
+    paths: Vec<ExposurePath>,
+    /// How many times as long as the exposures the paths are.
+    stretches: Vec<f64>,
+    /// What the neighbours say about each motion.
+    pub(super) priors: Vec<PathPrior>,
+    /// What was odd, one sentence each.
+    pub(super) warnings: Vec<String>,
+    /// Whether neighbours say anything about a frame.
+    continuity: bool,
+}
+
+impl Frames {
+    /// Repairs the exposures of a run, unless `continuity` is left out.
+    pub(super) fn new(dataset: &Dataset, run: &Run, continuity: bool) -> Result<Self, MapError> {
+        check_frames(dataset, run)?;
+        Self::of(dataset, &run.exposures, &run.frames, continuity)
+    }
+
+    /// Repairs the exposures of all frames of the data set. Without `continuity` all of them stay as they are, and no
+    /// frame says anything about another.
+    pub(super) fn of(
+        dataset: &Dataset,
+        exposures: &[TimedExposure],
+        records: &[FrameRecord],
+        continuity: bool,
+    ) -> Result<Self, MapError> {
+        if !continuity {
+            let prior = |exposure| PathPrior { middle: motion_of(exposure).mid(), motion: None };
+            let priors = exposures.iter().map(prior).collect();
+            let (exposures, records) = (exposures.to_vec(), records.to_vec());
+            return Ok(Self::on_paths(dataset, exposures, records, priors, Vec::new(), continuity));
+        }
+        let seconds = exposure_seconds(dataset);
+        let settings = ContinuitySettings::default();
+        let evidence = FrameEvidence::new(dataset);
+        let compare = |suspicion: &Suspicion<'_>| evidence.compare(suspicion);
+        let repaired = repair_run(exposures, records, &seconds, &settings, &compare)?;
+        let frames = run_frames(&repaired.exposures, records, &seconds)?;
+        let motions = predict_motions(&frames, &settings).into_iter();
+        let prior = |(motion, exposure)| PathPrior { middle: motion_of(exposure).mid(), motion };
+        let priors: Vec<PathPrior> = motions.zip(&repaired.exposures).map(prior).collect();
+        let warnings = repairs(&repaired, "before");
+        let records = records.to_vec();
+        Ok(Self::on_paths(dataset, repaired.exposures, records, priors, warnings, continuity))
+    }
+
+    /// Gives every frame a path over all the time in which anything of it was measured.
+    fn on_paths(
+        dataset: &Dataset,
+        exposures: Vec<TimedExposure>,
+        records: Vec<FrameRecord>,
+        mut priors: Vec<PathPrior>,
+        warnings: Vec<String>,
+        continuity: bool,
+    ) -> Self {
+        let sensor = sensor(dataset);
+        let stretch = |index: usize| {
+            let offset = dataset.depth_timestamp(index) - dataset.timestamp(index);
+            sensor.times(dataset.exposure_seconds(index), offset).1
+        };
+        let stretches: Vec<f64> = (0..dataset.len()).map(stretch).collect();
+        let tracked = |index: usize| records[index].status != FrameStatus::Lost;
+        let paths: Vec<ExposurePath> = (0..exposures.len())
+            .map(|index| {
+                let seconds = dataset.exposure_seconds(index);
+                let beside =
+                    |other: Option<usize>| other.filter(|k| tracked(*k)).and_then(|k| exposures.get(k));
+                let neighbours =
+                    [beside(index.checked_sub(1)), beside(Some(index + 1).filter(|k| *k < exposures.len()))];
+                long_path(&exposures[index], neighbours, seconds, stretches[index])
+            })
+            .collect();
+        for ((prior, path), stretch) in priors.iter_mut().zip(&paths).zip(&stretches) {
+            if *stretch != 1.0 {
+                prior.middle = path.ends.mid();
+                prior.motion = prior.motion.map(|motion| motion.times(*stretch));
+            }
+        }
+        Self { exposures, records, paths, stretches, priors, warnings, continuity }
+    }
+
+    /// Repairs exposures that were refined, unless continuity is left out, and tells what was done.
+    pub(super) fn repair(
+        &self,
+        dataset: &Dataset,
+        refined: &[TimedExposure],
+    ) -> Result<(Vec<TimedExposure>, Vec<String>), MapError> {
+        if !self.continuity {
+            return Ok((refined.to_vec(), Vec::new()));
+        }
+        let settings = ContinuitySettings::default();
+        let evidence = FrameEvidence::new(dataset);
+        let compare = |suspicion: &Suspicion<'_>| evidence.compare(suspicion);
+        let seconds = exposure_seconds(dataset);
+        let repaired = repair_run(refined, &self.records, &seconds, &settings, &compare)?;
+        let warnings = repairs(&repaired, "after");
+        Ok((repaired.exposures, warnings))
+    }
+
+    /// The exposure of a frame with that state.
+    pub(super) fn exposure_of(&self, index: usize, state: &FrameState) -> TimedExposure {
+        state.path.stretched(1.0 / self.stretches[index]).timed(self.exposures[index].timestamp)
+    }
+
+    /// First estimate of a frame's path.
+    pub(super) fn state(&self, index: usize, settings: &MapSettings) -> FrameState {
+        let path = self.paths[index];
+        FrameState::new(if settings.blur { path } else { ExposurePath::still(path.mid()) })
+    }
+}
+
+/// The bundle with an empty map, and the index in the data set of every keyframe; frames that cannot be read are left
+/// out with a warning.
+pub(super) fn bundle(
+    dataset: &Dataset,
+    frames: &mut Frames,
+    settings: &MapSettings,
+) -> Result<BundleAdjustment, MapError> {
+    let sensor = sensor(dataset);
+    let chosen = choose_keyframes(&frames.records, settings.max_keyframes);
+    let load = |&index: &usize| (index, observation(dataset, &sensor, index));
+    let loaded: Vec<_> = chosen.par_iter().map(load).collect();
+    let mut keyframes = Vec::new();
+    for (index, observation) in loaded {
+        match observation {
+            Ok(observation) => keyframes.push(Keyframe::new(index, observation, frames.priors[index])),
+            Err(reason) => frames.warnings.push(format!("keyframe {index} left out: {reason}")),
+        }
+    }
+    if keyframes.is_empty() {
+        let reason = frames.warnings.last().cloned().unwrap_or_else(|| "all frames are lost".to_owned());
+        return Err(MapError::NoKeyframe(reason));
+    }
+    let mut states: Vec<FrameState> =
+        keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
+    set_gains(&sensor, &keyframes, &mut states);
+    let pixels = sensor.camera.width * sensor.camera.height;
+    Ok(BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(pixels), keyframes, states))
+}
+
+/// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.
+/// The map is as bright as the median keyframe.
+fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState]) {
+    let ratios: Vec<f64> = (1..keyframes.len())
+        .into_par_iter()
+        .map(|k| {
+            let [before, here] = [k - 1, k].map(|k| Placed {
+                seen: keyframes[k].observation.level(1),
+                world_from_camera: states[k].path.mid(),
+            });
+            log_brightness(&sensor.inverse_response, before, here).unwrap_or(0.0)
+        })
+        .collect();
+    let mut log_gains = vec![0.0];
+    ratios.iter().for_each(|ratio| log_gains.push(log_gains[log_gains.len() - 1] + ratio));
+    if log_gains.iter().any(|log_gain| log_gain.abs() > NOTICEABLE) {
+        let median = quantile(&log_gains, 0.5).unwrap_or(0.0);
+        states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain - median);
+    }
+}
+
+/// The path over `stretch` times the exposure time, `seconds`. A straight exposure says nothing about a bow, which
+/// matters over a longer time: there the acceleration follows from the neighbours, as far as they are tracked.
+fn long_path(
+    exposure: &TimedExposure,
+    neighbours: [Option<&TimedExposure>; 2],
+    seconds: f64,
+    stretch: f64,
+) -> ExposurePath {
+    let path = ExposurePath::through(exposure);
+    if stretch == 1.0 {
+        return path;
+    }
+    let mid = exposure.mid;
+    let half_motion = motion_of(exposure).motion() * (0.5 * stretch);
+    let acceleration = match neighbours {
+        [Some(before), Some(after)] => {
+            let rate = |other: &TimedExposure| {
+                let time = other.timestamp - exposure.timestamp;
+                (mid.tangent_to(&other.mid) / time, time)
+            };
+            let ((into, since), (out, until)) = (rate(before), rate(after));
+            (out - into) * (2.0 / (until - since))
+        }
+        _ => Vector6::zeros(),
+    };
+    let half_time = 0.5 * stretch * seconds;
+    let lift = acceleration * (0.5 * half_time * half_time);
+    let [start, end] = [lift - half_motion, lift + half_motion].map(|tangent| mid.perturbed(&tangent));
+    ExposurePath::through(&TimedExposure { timestamp: exposure.timestamp, start, mid, end })
+}
+
+fn check_frames(dataset: &Dataset, run: &Run) -> Result<(), MapError> {
+    if run.exposures.len() != dataset.len() || run.frames.len() != dataset.len() {
+        return Err(MapError::Frames { run: run.exposures.len(), dataset: dataset.len() });
+    }
+    for (index, exposure) in run.exposures.iter().enumerate() {
+        let (run, dataset) = (exposure.timestamp, dataset.timestamp(index));
+        if (run - dataset).abs() > SAME_TIME {
+            return Err(MapError::Timestamp { index, run, dataset });
+        }
+    }
+    Ok(())
+}
+
+fn exposure_seconds(dataset: &Dataset) -> Vec<f64> {
+    (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect()
+}
+
+/// One sentence per kind of repair.
+fn repairs(repaired: &RepairedRun, when: &str) -> Vec<String> {
+    let kinds = [
+        (FrameVerdict::Reversed, "start and end exchanged"),
+        (FrameVerdict::Replaced, "replaced by the path of their neighbours"),
+        (FrameVerdict::Bridged, "lost and bridged"),
+    ];
+    let sentence = |(verdict, what): (FrameVerdict, &str)| {
+        let frames = repaired.continuity.frames_with(verdict);
+        (!frames.is_empty()).then(|| format!("{when} refinement, exposures {what}: frames {frames:?}"))
+    };
+    kinds.into_iter().filter_map(sentence).collect()
+}

@@ -1,0 +1,69 @@
+//! The keyframes of a run, all at once.
+
+use mba_adjust::deblurring::{DeblurError, DeblurMemory, KeyframeDeblurrer};
+use mba_io::dataset::Dataset;
+use mba_io::trajectory_file::TimedExposure;
+use mba_tracker::{SimdLevel, TrackerConfig};
+use rayon::prelude::*;
+
+use super::{RunError, RunWriter};
+
+/// Why a keyframe has no image.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error(transparent)]
+    Image(#[from] DeblurError),
+    #[error(transparent)]
+    Output(#[from] RunError),
+}
+
+/// Deblurs every keyframe that `run` has by now with the exposure that `run` has for it, and writes the images into
+/// the run's folder. Call it after the last frame: by then all exposures are final. `observe` is called after each
+/// keyframe, from any thread.
+///
+/// A keyframe that cannot be read is left out, and `run` gets a warning that says why. The images do not depend on the
+/// number of threads.
+///
+/// # Errors
+/// [`RunError`] when an image cannot be written.
+pub fn write_deblurred_keyframes(
+    dataset: &Dataset,
+    config: &TrackerConfig,
+    run: &mut RunWriter,
+    observe: impl Fn() + Sync,
+) -> Result<(), RunError> {
+    let keyframes = run.keyframes();
+    // Threads would make their memory all the same.
+    if keyframes.is_empty() {
+        return Ok(());
+    }
+    let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
+    let write = |memory: &mut DeblurMemory, (index, exposure): (usize, TimedExposure)| {
+        let written = write_keyframe(dataset, &deblurrer, run, index, &exposure, memory);
+        observe();
+        (index, written)
+    };
+    let outcomes: Vec<_> = keyframes.into_par_iter().map_init(|| deblurrer.memory(), write).collect();
+    for (index, outcome) in outcomes {
+        match outcome {
+            Ok(()) => run.count_deblurred(),
+            Err(Failure::Output(error)) => return Err(error),
+            Err(Failure::Image(reason)) => run.warn(format!("keyframe {index} not deblurred: {reason}")),
+        }
+    }
+    Ok(())
+}
+
+fn write_keyframe(
+    dataset: &Dataset,
+    deblurrer: &KeyframeDeblurrer,
+    run: &RunWriter,
+    index: usize,
+    exposure: &TimedExposure,
+    memory: &mut DeblurMemory,
+) -> Result<(), Failure> {
+    let frame = dataset.frame(index).map_err(DeblurError::from)?;
+    let deblurred = deblurrer.deblur(&frame, exposure, memory)?;
+    run.write_deblurred(index, [frame.width, frame.height], deblurred.rgb)?;
+    Ok(())
+}

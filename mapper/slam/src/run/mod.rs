@@ -1,0 +1,40 @@
+//! The RUN folder: what commands hand to each other.
+//!
+//! | file | content |
+//! |---|---|
+//! | `trajectory.txt` | camera-to-world at mid exposure, every input frame once, TUM lines |
+//! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
+//! | `frames.csv` | one [`FrameRecord`] per frame |
+//! | `summary.json` | a [`Summary`] |
+//! | `map.ply` | a map of Gaussians, see [`mba_raster::gaussians::read_ply`], or |
+//! | `map.mbaf` | a map that is a tri-plane field, see [`mba_field::triplane::read_field`] |
+//! | `deblurred/NNNNNN.png` | the deblurred image of every keyframe, named by the index of the frame |
+//!
+//! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
+
+mod camera;
+mod deblurred_keyframes;
+mod earlier_images;
+mod error;
+mod frame_record;
+mod keyframe_images;
+mod merit;
+mod reader;
+mod rows;
+mod summary;
+mod writer;
+
+pub use camera::{RunCamera, RunResponse};
+pub use deblurred_keyframes::write_deblurred_keyframes;
+pub use error::RunError;
+pub use frame_record::{FrameRecord, FrameStatus, Reason};
+pub use merit::{Merit, mid_pose, trajectory_figures};
+pub use reader::Run;
+pub(crate) use rows::RunRows;
+pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
+pub use writer::RunWriter;
+
+pub use mba_io::run_layout::{
+    CHECKPOINT_FILE, DEBLURRED_FOLDER, DEPTH_FOLDER, EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE,
+    TRAJECTORY_FILE, deblurred_path,
+};

@@ -1,0 +1,55 @@
+//! What a run has recorded, as a checkpoint keeps it.
+
+use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
+use mba_io::trajectory_file::TimedExposure;
+use serde::{Deserialize, Serialize};
+
+use super::{FrameRecord, RunError, RunWriter};
+
+/// Everything that a [`RunWriter`] was told.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct RunRows {
+    /// Time and poses at opening, middle and closing of the shutter.
+    exposures: Vec<(f64, [PoseNumbers; 3])>,
+    frames: Vec<FrameRecord>,
+    skipped: usize,
+    warnings: Vec<String>,
+}
+
+impl RunRows {
+    /// Number of frames.
+    pub(crate) fn len(&self) -> usize {
+        self.frames.len()
+    }
+}
+
+impl RunWriter {
+    /// What was recorded so far.
+    pub(crate) fn rows(&self) -> RunRows {
+        let row = |exposure: &TimedExposure| {
+            (exposure.timestamp, [exposure.start, exposure.mid, exposure.end].map(|pose| numbers(&pose)))
+        };
+        RunRows {
+            exposures: self.exposures.iter().map(row).collect(),
+            frames: self.frames.clone(),
+            skipped: self.skipped,
+            warnings: self.warnings.clone(),
+        }
+    }
+
+    /// Takes over what a run that was stopped had recorded, and brings the folder up to date.
+    ///
+    /// # Errors
+    /// As [`Self::flush`].
+    pub(crate) fn restore(&mut self, rows: RunRows) -> Result<(), RunError> {
+        let exposure = |(timestamp, poses): (f64, [PoseNumbers; 3])| {
+            let [start, mid, end] = poses.map(pose);
+            TimedExposure { timestamp, start, mid, end }
+        };
+        self.exposures = rows.exposures.into_iter().map(exposure).collect();
+        self.frames = rows.frames;
+        self.skipped = rows.skipped;
+        self.warnings = rows.warnings;
+        self.flush()
+    }
+}

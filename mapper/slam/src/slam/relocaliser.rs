@@ -1,0 +1,75 @@
+//! Aligning a frame with a sharp view outside of the tracking loop: to recognise a place, or to judge a view.
+
+use mba_adjust::bundle::{FrameState, Keyframe};
+use mba_adjust::deblurring::{DeblurMemory, KeyframeDeblurrer};
+use mba_io::dataset::RgbdFrame;
+use mba_tracker::error::FrameError as TrackError;
+use mba_tracker::geometry::RigidTransform;
+use mba_tracker::{FrameStatus, SimdLevel, Tracker, TrackerConfig};
+
+use super::messages::SharpView;
+use crate::tracking::tracker_view;
+
+/// Share of the view's patches that have to agree for a frame to be recognised.
+const MIN_INLIERS: f32 = 0.35;
+
+/// A tracker of its own, which starts anew for every question.
+pub(super) struct Relocaliser {
+    config: TrackerConfig,
+    memory: Vec<u8>,
+    deblurrer: KeyframeDeblurrer,
+    deblur_memory: DeblurMemory,
+}
+
+/// Where a frame was seen from, according to one view.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PoseMeasurement {
+    /// `world_from_camera` at mid exposure, in the world of the view's pose.
+    pub(super) world_from_camera: RigidTransform,
+    /// Robust photometric residual, standard deviations of the nominal noise.
+    pub(super) residual: f32,
+}
+
+impl Relocaliser {
+    pub(super) fn new(config: &TrackerConfig) -> Self {
+        let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
+        let deblur_memory = deblurrer.memory();
+        let mut config = config.clone();
+        // The whole of what is known: a place is recognised from a single view.
+        config.align.depth_term = true;
+        Self { memory: vec![0; config.workspace_len()], config, deblurrer, deblur_memory }
+    }
+
+    /// Aligns a frame with a view, from a guess of the frame's pose; `None` if they do not fit.
+    pub(super) fn align_to(
+        &mut self,
+        image: &RgbdFrame,
+        view: &SharpView,
+        world_from_camera: &RigidTransform,
+    ) -> Option<PoseMeasurement> {
+        let mut tracker = Tracker::new(&self.config, SimdLevel::new(), &mut self.memory).ok()?;
+        let align = || -> Result<_, TrackError> {
+            tracker.relocate(&view.reference(&self.config.camera)?, world_from_camera)?;
+            tracker.track(&tracker_view(image)?)
+        };
+        let result = { align }().ok()?;
+        (result.status == FrameStatus::Ok && result.inliers > MIN_INLIERS).then_some(PoseMeasurement {
+            world_from_camera: result.world_from_mid,
+            residual: result.residual,
+        })
+    }
+
+    /// A keyframe as a sharp view: deblurred with its own motion.
+    pub(super) fn keyframe_view(
+        &mut self,
+        keyframe: &Keyframe,
+        state: &FrameState,
+        depth_scale: f64,
+    ) -> SharpView {
+        let image = keyframe.observation.level(0).frame(keyframe.index, depth_scale);
+        let exposure = state.path.stretched(keyframe.observation.level(0).times.exposure).timed(0.0);
+        let deblurred = self.deblurrer.deblur(&image, &exposure, &mut self.deblur_memory);
+        let rgb = deblurred.map_or_else(|_| image.rgb.clone(), |deblurred| deblurred.rgb);
+        SharpView { rgb, depth: image.depth, world_from_camera: exposure.mid, start_from: None }
+    }
+}

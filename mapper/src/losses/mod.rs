@@ -1,5 +1,0 @@
-//! Losses on rendered images, with their gradients by the pixels.
-
-mod ssim;
-
-pub use ssim::Ssim;

@@ -1,0 +1,61 @@
+//! Wrong sizes and states are refused with a message, never answered with zeros.
+
+use mba_mapper::exposure::{ExposureRenderer, ExposureScratch};
+use mba_mapper::gaussians::{Gaussian, Gaussians};
+use mba_mapper::raster::{GaussianGradients, RasterImage, RasterScratch, RasterView, Rasterizer};
+use mba_tests::raster_scene::{random_gaussians, random_view, to_parameters};
+use mba_tests::transfer_scene::Uniform;
+use mba_tracker::simd::Level;
+
+fn scene() -> (Gaussians, RasterView) {
+    let mut uniform = Uniform::new(6);
+    let view = random_view(&mut uniform, 60, 90);
+    (random_gaussians(&mut uniform, &view, 20).iter().map(to_parameters).collect(), view)
+}
+
+/// The backward pass after a forward pass, with an image gradient of `size` and gradients for `count` Gaussians.
+fn backward([width, height]: [usize; 2], count: usize) {
+    let (gaussians, view) = scene();
+    let rasterizer = Rasterizer::new(Level::new());
+    let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
+    rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
+    let mut gradients = GaussianGradients::zeros(count);
+    rasterizer.backward(&gaussians, &RasterImage::zeros(width, height), &mut scratch, &mut gradients);
+}
+
+#[test]
+fn right_sizes_pass() {
+    backward([60, 90], 20);
+}
+
+#[test]
+#[should_panic(expected = "the size of the view that was rendered before")]
+fn an_image_of_another_size_is_refused() {
+    backward([59, 90], 20);
+}
+
+#[test]
+#[should_panic(expected = "the size of the view that was rendered before")]
+fn gradients_of_another_map_are_refused() {
+    backward([60, 90], 19);
+}
+
+#[test]
+#[should_panic(expected = "none was rendered before")]
+fn an_exposure_goes_backward_only_after_it_went_forward() {
+    let (gaussians, _) = scene();
+    let mut gradients = GaussianGradients::zeros(20);
+    let renderer = ExposureRenderer::new(Level::new());
+    renderer.backward(
+        &gaussians,
+        &RasterImage::zeros(60, 90),
+        &mut ExposureScratch::default(),
+        &mut gradients,
+    );
+}
+
+#[test]
+#[should_panic(expected = "index out of bounds")]
+fn a_gaussian_that_is_not_there_is_not_replaced() {
+    Gaussians::zeros(3).set(3, &Gaussian::default());
+}

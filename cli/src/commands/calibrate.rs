@@ -41,6 +41,14 @@ pub fn run(args: &Calibrate, console: &Console) -> anyhow::Result<()> {
             dataset = dataset.with_calibration(calibration)?;
         }
     }
+    if let Some((finding, found)) = self_calibration::depth_scale(&dataset) {
+        findings.push(finding);
+        if let Some(depth_scale) = found {
+            let mut calibration = dataset.calibration().clone();
+            (calibration.depth_scale, calibration.sources.depth_scale) = (depth_scale, Knowledge::Estimated);
+            dataset = dataset.with_calibration(calibration)?;
+        }
+    }
     if args.focal_length {
         let (finding, factor) = self_calibration::focal_length(&dataset);
         findings.push(finding);

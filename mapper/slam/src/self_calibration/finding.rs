@@ -21,11 +21,13 @@ pub struct Value {
 /// What came of looking for one fact about the camera.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Finding {
-    /// What was looked for: `exposure`, `readout`, `depth_delay`, `depth_shift`, `vignetting` or `focal_length`.
+    /// What was looked for: `exposure`, `readout`, `depth_delay`, `depth_shift`, `vignetting`, `depth_scale` or
+    /// `focal_length`.
     pub fact: &'static str,
     /// Estimated, or still assumed.
     pub knowledge: Knowledge,
-    /// What was found: seconds, pixels for a focal length or a shift, the share of light in the corners for vignetting; none if the recording does not tell.
+    /// What was found: seconds, pixels for a focal length or a shift, the share of light in the corners for vignetting, raw
+    /// units per metre for a depth scale; none if the recording does not tell.
     #[serde(flatten)]
     pub value: Option<Value>,
     /// What else there is to say.

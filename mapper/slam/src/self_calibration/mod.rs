@@ -5,7 +5,7 @@
 //! after the other is the one with which the edges of colour lie on the jumps of depth; they also tell by how much depth
 //! is late. Where both roll, the readout follows from motion like the exposures. A stretch of the recording is tracked again and again with what is supposed, until the motion agrees with it. How light falls off towards the corners
 //! shows on surfaces that are seen in several places of the image. What
-//! a recording cannot tell is said to be unknown.
+//! a recording cannot tell is said to be unknown; the metre of depth is told by an accelerometer only.
 //!
 //! Sources: exposure from blur, e.g. Gong et al. (CasualHDRSplat), 2025; readout as an unknown of the camera, e.g. Kerl,
 //! Stueckler and Cremers, ICCV 2015.
@@ -18,6 +18,7 @@ mod exposure;
 mod exposure_times;
 mod finding;
 mod focal;
+mod metre;
 mod motion;
 mod patches_of_light;
 mod readout;
@@ -31,6 +32,7 @@ mod window;
 pub use complete::{complete, is_complete};
 pub use finding::{Finding, Value};
 pub use focal::focal_length;
+pub use metre::depth_scale;
 pub use stored::{
     ESTIMATED_EXPOSURES_FILE, ESTIMATED_FILE, StoredError, has_estimates, read_back, remove, write,
 };

@@ -1,8 +1,14 @@
 //! Access to `data/raster_golden`: rendered images and exact gradients of small scenes, computed in f64 by a dense
 //! renderer with automatic differentiation and checked against a published renderer.
+//!
+//! Depth in the files is that of the centres, as the published renderer has it. The project composites the depth on the
+//! ray of the pixel, and what it makes of a number per Gaussian, such as the z of its centre, is a colour: the files'
+//! depth is the red of a second rendering, and their loss and gradients are sums over both.
 
 use mba_mapper::raster::RasterView;
-use mba_mapper::raster::reference::{ReferenceGaussian, ReferencePixelGradient};
+use mba_mapper::raster::reference::{
+    ReferenceGaussian, ReferenceGradient, ReferenceGradients, ReferencePixelGradient,
+};
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use serde_json::Value;
@@ -81,6 +87,22 @@ pub fn scenes() -> Vec<GoldenScene> {
     NAMES_TEXTS_ERRORS.map(scene).into()
 }
 
+/// A view, and the gradient by its pixels.
+pub struct GoldenRendering {
+    /// The view.
+    pub view: RasterView,
+    /// The Gaussians.
+    pub gaussians: Vec<ReferenceGaussian>,
+    /// Gradient of the loss by the pixels.
+    pub by_pixels: ReferencePixelGradient,
+}
+
+/// A gradient by colour only.
+fn by_colour(colour: Vec<Vector3<f64>>) -> ReferencePixelGradient {
+    let zeros = vec![0.0; colour.len()];
+    ReferencePixelGradient { depth: zeros.clone(), alpha: zeros, colour }
+}
+
 impl GoldenScene {
     /// The camera. The files put the centre of the top-left pixel at (0.5, 0.5), the project at (0, 0).
     #[must_use]
@@ -124,15 +146,56 @@ impl GoldenScene {
             .collect()
     }
 
-    /// Gradient of the loss by the pixels.
+    /// The rendering of colour and alpha, and the one whose red is the depth.
     #[must_use]
-    pub fn pixel_gradient(&self) -> ReferencePixelGradient {
-        let depth = numbers(&self.file["weights"]["v"]);
-        ReferencePixelGradient {
-            colour: numbers(&self.file["weights"]["w"]).chunks_exact(3).map(triple).collect(),
-            alpha: vec![0.0; depth.len()],
-            depth,
+    pub fn renderings(&self) -> [GoldenRendering; 2] {
+        let (view, gaussians) = (self.view(), self.gaussians());
+        let of_colour = numbers(&self.file["weights"]["w"]).chunks_exact(3).map(triple).collect();
+        let red = |value: f64| Vector3::new(value, 0.0, 0.0);
+        let of_depth = numbers(&self.file["weights"]["v"]).into_iter().map(red).collect();
+        let camera_from_world = view.world_from_camera.inverse();
+        let with_depth = |gaussian: &ReferenceGaussian| ReferenceGaussian {
+            colour: red(camera_from_world.transform_point(&gaussian.mean).z),
+            ..*gaussian
+        };
+        let depths = gaussians.iter().map(with_depth).collect();
+        [
+            GoldenRendering { view, gaussians, by_pixels: by_colour(of_colour) },
+            GoldenRendering {
+                view: RasterView { background: [0.0; 3], ..view },
+                gaussians: depths,
+                by_pixels: by_colour(of_depth),
+            },
+        ]
+    }
+
+    /// The gradients of the file's loss from those of [`Self::renderings`]. The z of a centre is a number of the
+    /// transformation to the camera and of the centre.
+    #[must_use]
+    pub fn total(&self, [colour, depth]: &[ReferenceGradients; 2]) -> ReferenceGradients {
+        let rotation = self.view().world_from_camera.inverse().rotation_matrix();
+        let mut view = colour.view;
+        view.rotation += depth.view.rotation;
+        view.translation += depth.view.translation;
+        let mut gaussians = Vec::new();
+        for ((one, other), gaussian) in colour.gaussians.iter().zip(&depth.gaussians).zip(self.gaussians()) {
+            let by_z = other.colour.x;
+            let of_centre = by_z * gaussian.mean.transpose();
+            view.rotation.set_row(2, &(view.rotation.row(2) + of_centre));
+            view.translation.z += by_z;
+            let mut sum = ReferenceGradient {
+                mean: one.mean + other.mean + by_z * rotation.row(2).transpose(),
+                scale: one.scale + other.scale,
+                rotation: core::array::from_fn(|k| one.rotation[k] + other.rotation[k]),
+                opacity: one.opacity + other.opacity,
+                ..*one
+            };
+            sum.splat.centre += other.splat.centre;
+            sum.splat.depth += by_z;
+            (0..3).for_each(|k| sum.splat.conic[k] += other.splat.conic[k]);
+            gaussians.push(sum);
         }
+        ReferenceGradients { gaussians, view }
     }
 
     /// An output image, row by row: `rgb`, `depth`, `alpha` or `contributions`.

@@ -1,5 +1,6 @@
 //! The Gaussian rasterizer against golden data, its oracle, finite differences and hostile input.
 
+mod depth;
 mod derivatives;
 mod exposure;
 mod golden;

@@ -1,6 +1,7 @@
 //! Gradient of one tile by its splats, back to front.
 //!
-//! The loss is linear in the weights of the splats at a pixel: a splat is worth `q = dL/dI c + dL/dD z + dL/dA`, the
+//! The loss is linear in the weights of the splats at a pixel: a splat of which the depth there is z is worth
+//! `q = dL/dI c + dL/dD z + dL/dA`, the
 //! background `dL/dI c`. With B the worth of everything behind, seen through nothing, `dL/dalpha = T (q - B)` and
 //! B of the next splat in front is `B + alpha (q - B)`: one number per pixel however many channels there are.
 //!
@@ -19,8 +20,8 @@ use super::project::Splat;
 use super::tile::{BLOCK_WIDTH, CELL, CELL_HEIGHT, CELLS, TILE_COLUMNS};
 
 /// Sums over the pixels of a tile for one splat, with `s` the gradient by the logarithm of alpha, (u, v) the
-/// coordinates in which the splat is round, and `w` the weight: `s`, `s u`, `s v`, `s u^2`, `s u v`, `s v^2`,
-/// `w dL/dI` (three), `w dL/dD`; two unused.
+/// coordinates in which the splat is round, `w` the weight and `g = w dL/dD`: `s`, `s u`, `s v`, `s u^2`, `s u v`,
+/// `s v^2`, `w dL/dI` (three), `g`, `g u`, `g v`.
 pub(super) type SplatSums = [f32; 12];
 
 /// What the backward pass keeps of a cell.
@@ -54,8 +55,8 @@ impl GradientCell {
 /// The gradient by the pixels of a tile, block by block.
 pub(super) type TileGradient = [[GradientCell; CELLS]; TILE_COLUMNS];
 
-/// Ten sums, one vector each.
-struct Sums<S: Simd>([S::f32s; 10]);
+/// The sums of [`SplatSums`], one vector each.
+struct Sums<S: Simd>([S::f32s; 12]);
 
 /// Writes the sums of every splat of the tile to `sums`, which has the length of its list. `gradient` holds the
 /// gradient by the pixels on entry and is used up. Without `GEOMETRY` depth and alpha count as having no gradient.
@@ -106,7 +107,7 @@ fn replay<S: Simd, const GEOMETRY: bool>(
     let [left, top] = origin.map(|pixel| pixel as f32);
     for (index, (entry, out)) in list.iter().zip(out).enumerate().rev() {
         let splat = &splats[entry.rank as usize];
-        let mut sums = Sums([S::f32s::splat(simd, 0.0); 10]);
+        let mut sums = Sums([S::f32s::splat(simd, 0.0); 12]);
         for (block, &range) in entry.rows.iter().enumerate() {
             let falloff = BlockFalloff::new(simd, splat, left + (block * BLOCK_WIDTH) as f32);
             let from_centre = top - splat.centre[1];
@@ -147,7 +148,7 @@ impl<S: Simd> Sums<S> {
         let by_colour = [load(&cell.by_colour[0]), load(&cell.by_colour[1]), load(&cell.by_colour[2])];
         let mut worth = zero;
         if GEOMETRY {
-            worth = load(&cell.by_depth).mul_add(splat.depth, load(&cell.by_alpha));
+            worth = load(&cell.by_depth).mul_add(at.depth(simd, splat), load(&cell.by_alpha));
         }
         for (by_colour, &colour) in by_colour.iter().zip(&splat.colour) {
             worth = by_colour.mul_add(colour, worth);
@@ -172,21 +173,23 @@ impl<S: Simd> Sums<S> {
             *sum = weight.mul_add(by_colour, *sum);
         }
         if GEOMETRY {
-            sums[9] = weight.mul_add(load(&cell.by_depth), sums[9]);
+            let by_depth = weight * load(&cell.by_depth);
+            sums[9] += by_depth;
+            sums[10] = by_depth.mul_add(at.u, sums[10]);
+            sums[11] = by_depth.mul_add(at.v, sums[11]);
         }
     }
 
     #[inline(always)]
     fn finish(self, simd: S) -> SplatSums {
-        let [a, b, c, d, e, f, g, h, i, j] = each(
+        let [a, b, c, d, e, f, g, h, i, j, k, l] = each(
             #[inline(always)]
-            |k| fold(simd, self.0[k]),
+            |sum| fold(simd, self.0[sum]),
         );
-        let zero = f32x4::splat(simd, 0.0);
         let mut out = [0.0; 12];
         sum_four(a, b, c, d).store_slice(&mut out[..4]);
         sum_four(e, f, g, h).store_slice(&mut out[4..8]);
-        sum_four(i, j, zero, zero).store_slice(&mut out[8..]);
+        sum_four(i, j, k, l).store_slice(&mut out[8..]);
         out
     }
 }

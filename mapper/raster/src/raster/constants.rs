@@ -4,6 +4,11 @@
 /// than about a pixel, so none falls between pixel centres.
 pub const LOW_PASS: f64 = 0.3;
 
+/// Variance in pixels squared that is added to both axes of a projected Gaussian where the tilt of its depth is found: a
+/// splat seen edge-on tilts by some of its own standard deviations, not without bound. It is far below [`LOW_PASS`], which
+/// would flatten the tilt of every splat that is as small as a pixel.
+pub const TILT_LOW_PASS: f64 = 0.03;
+
 /// Largest opacity of a splat at a pixel. It keeps `1 - alpha` away from zero, which the backward pass divides by.
 pub const MAX_ALPHA: f64 = 0.999;
 

@@ -40,6 +40,15 @@ pub(super) struct Falloff<S: Simd> {
     pub(super) alpha: S::f32s,
 }
 
+impl<S: Simd> Falloff<S> {
+    /// Camera z at which the rays of the pixels meet the peak of the splat, metres.
+    #[inline(always)]
+    pub(super) fn depth(&self, simd: S, splat: &Splat) -> S::f32s {
+        let [along_u, along_v] = splat.tilt;
+        self.u.mul_add(along_u, self.v.mul_add(along_v, S::f32s::splat(simd, splat.depth)))
+    }
+}
+
 /// Number of vectors of a cell.
 #[inline(always)]
 pub(super) const fn parts<S: Simd>() -> usize {

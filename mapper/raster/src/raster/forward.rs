@@ -14,7 +14,7 @@
 use fearless_simd::{Level, dispatch, prelude::*};
 
 use super::constants::{MIN_ALPHA, MIN_TRANSMITTANCE};
-use super::falloff::{BlockFalloff, is_listed, parts};
+use super::falloff::{BlockFalloff, Falloff, is_listed, parts};
 use super::project::Splat;
 use super::tile::{BLOCK_WIDTH, CELL, CELL_HEIGHT, CELLS, TILE_COLUMNS, TILE_HEIGHT, TILE_WIDTH, TileEntry};
 
@@ -111,8 +111,8 @@ fn composite_list<S: Simd, const DEPTH: bool, const COUNT: bool>(
                 let cell = first + offset;
                 let dy = from_centre + (cell * CELL_HEIGHT) as f32;
                 for part in (0..parts::<S>()).filter(|&part| is_listed::<S>(range, cell, part)) {
-                    let alpha = falloff.at(simd, dy, part).alpha;
-                    let used = blend::<_, DEPTH>(simd, splat, alpha, end, pixels, part);
+                    let at = falloff.at(simd, dy, part);
+                    let used = blend::<_, DEPTH>(simd, splat, &at, end, pixels, part);
                     if COUNT {
                         let count = &mut counts.blocks[block][cell][part * S::f32s::LEN..][..S::f32s::LEN];
                         (S::f32s::from_slice(simd, count) + used).store_slice(count);
@@ -132,7 +132,7 @@ fn composite_list<S: Simd, const DEPTH: bool, const COUNT: bool>(
 fn blend<S: Simd, const DEPTH: bool>(
     simd: S,
     splat: &Splat,
-    alpha: S::f32s,
+    at: &Falloff<S>,
     end: f32,
     cell: &mut PixelCell,
     part: usize,
@@ -141,15 +141,15 @@ fn blend<S: Simd, const DEPTH: bool>(
     let load = |values: &[f32; CELL]| S::f32s::from_slice(simd, &values[pixels.clone()]);
     let transmittance = load(&cell.transmittance);
     let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
-    let visible = alpha.simd_ge(MIN_ALPHA as f32);
-    let behind = transmittance * (one - alpha);
+    let visible = at.alpha.simd_ge(MIN_ALPHA as f32);
+    let behind = transmittance * (one - at.alpha);
     let used = visible & behind.simd_gt(MIN_TRANSMITTANCE as f32);
-    let weight = used.select(alpha * transmittance, zero);
+    let weight = used.select(at.alpha * transmittance, zero);
     for (&colour, sum) in splat.colour.iter().zip(&mut cell.colour) {
         weight.mul_add(colour, load(sum)).store_slice(&mut sum[pixels.clone()]);
     }
     if DEPTH {
-        weight.mul_add(splat.depth, load(&cell.depth)).store_slice(&mut cell.depth[pixels.clone()]);
+        weight.mul_add(at.depth(simd, splat), load(&cell.depth)).store_slice(&mut cell.depth[pixels.clone()]);
     }
     let next = used.select(behind, -transmittance.abs());
     visible.select(next, transmittance).store_slice(&mut cell.transmittance[pixels.clone()]);

@@ -4,7 +4,7 @@
 
 use fearless_simd::{f32x8, mask32x8, prelude::*};
 
-use super::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, MIN_ALPHA, NEAR_PLANE};
+use super::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, MIN_ALPHA, NEAR_PLANE, TILT_LOW_PASS};
 use super::exp::exp;
 use super::tile::TileGrid;
 use super::view::RasterView;
@@ -79,6 +79,10 @@ pub(super) struct Lanes<S: Simd> {
     /// Covariance on the image (xx, xy, yy) and its determinant.
     pub(super) covariance: [f32x8<S>; 3],
     pub(super) determinant: f32x8<S>,
+    /// Inverse (xx, xy, yy) of the covariance with the low-pass of the tilt.
+    pub(super) tilt_inverse: [f32x8<S>; 3],
+    /// Metres of camera z per pixel to the right and down at which the depth changes.
+    pub(super) tilt: [f32x8<S>; 2],
     /// Elements uu, uv and vv of the upper triangular W with `W^T W` the inverse of the covariance.
     pub(super) whitening: [f32x8<S>; 3],
     /// Projected centre in pixels.
@@ -157,7 +161,8 @@ impl<S: Simd> Lanes<S> {
             #[inline(always)]
             |i| image_axes(view.focal[i], inverse_z, slope[i], &axes_camera[i], &axes_camera[2]),
         );
-        let (covariance, determinant) = covariance(&axes_image);
+        let (covariance, determinant) = covariance(&axes_image, LOW_PASS);
+        let (tilt_inverse, tilt) = tilt(&axes_image, &axes_camera[2]);
         let inverse = one / (determinant * covariance[2]).sqrt();
         let whitening = [covariance[2] * inverse, -covariance[1] * inverse, one / covariance[2].sqrt()];
         let centre = each(
@@ -170,7 +175,7 @@ impl<S: Simd> Lanes<S> {
         for &value in p {
             input += value * 0.0;
         }
-        for value in [whitening[0], whitening[1], whitening[2], centre[0], centre[1]] {
+        for value in [whitening[0], whitening[1], whitening[2], centre[0], centre[1], tilt[0], tilt[1]] {
             output += value * 0.0;
         }
         let sane = (input + output).simd_eq(1.0);
@@ -193,6 +198,8 @@ impl<S: Simd> Lanes<S> {
             follows: [slope[0].simd_eq(exact[0]), slope[1].simd_eq(exact[1])],
             covariance,
             determinant,
+            tilt_inverse,
+            tilt,
             whitening,
             centre,
             drawn: sane & visible & squared_norm.simd_gt(MIN_SQUARED_NORM),
@@ -236,16 +243,34 @@ fn image_axes<S: Simd>(
     )
 }
 
-/// Covariance with the low-pass, and its determinant. With the axes as vectors v and w, the determinant is
+/// Covariance with a low-pass, and its determinant. With the axes as vectors v and w, the determinant is
 /// `|v x w|^2 + k (|v|^2 + |w|^2) + k^2`, which does not cancel for needles.
 #[inline(always)]
-fn covariance<S: Simd>(axes: &LaneMatrix<S, 2, 3>) -> ([f32x8<S>; 3], f32x8<S>) {
-    let low_pass = LOW_PASS as f32;
+fn covariance<S: Simd>(axes: &LaneMatrix<S, 2, 3>, low_pass: f64) -> ([f32x8<S>; 3], f32x8<S>) {
+    let low_pass = low_pass as f32;
     let [v, w] = axes;
     let (vv, vw, ww) = (dot3(v, v), dot3(v, w), dot3(w, w));
     let cross = [v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]];
     let determinant = (vv + ww) * low_pass + low_pass * low_pass + dot3(&cross, &cross);
     ([vv + low_pass, vw, ww + low_pass], determinant)
+}
+
+/// Inverse of the covariance with the low-pass of the tilt, and the tilt: that inverse times the covariance of the offset
+/// on the image with camera z. Along the straight ray of the affine projection, the density peaks at the mean of z that
+/// is given the offset.
+#[inline(always)]
+fn tilt<S: Simd>(axes: &LaneMatrix<S, 2, 3>, along: &[f32x8<S>; 3]) -> ([f32x8<S>; 3], [f32x8<S>; 2]) {
+    let ([xx, xy, yy], determinant) = covariance(axes, TILT_LOW_PASS);
+    let inverse = [yy / determinant, -xy / determinant, xx / determinant];
+    let with_z = [dot3(&axes[0], along), dot3(&axes[1], along)];
+    (inverse, symmetric(&inverse, &with_z))
+}
+
+/// A symmetric matrix (xx, xy, yy) times a vector.
+#[inline(always)]
+pub(super) fn symmetric<S: Simd>(matrix: &[f32x8<S>; 3], vector: &[f32x8<S>; 2]) -> [f32x8<S>; 2] {
+    let ([xx, xy, yy], [x, y]) = (*matrix, *vector);
+    [xx.mul_add(x, xy * y), xy.mul_add(x, yy * y)]
 }
 
 #[inline(always)]

@@ -4,6 +4,10 @@
 //! by the pose of the camera. Gaussians are projected with the local affine approximation (Zwicker et al. 2001,
 //! EWA splatting), sorted by the camera z of their centres, ties by index, and composited front to back.
 //!
+//! The depth of a Gaussian at a pixel is where the ray of the pixel meets the peak of its density, as in RaDe-GS (Zhang et
+//! al. 2024), linear in the offset from its projected centre. With the depth of the centres, overlapping splats of a
+//! slanted surface would be composited nearer than that surface, because the nearer centre is in front.
+//!
 //! Stages, one file each: [`Rasterizer::forward`] projects, orders, bins and composites; [`Rasterizer::backward`]
 //! replays the pixels, reduces over tiles and projects back. Only the drivers know about threads; the results do not
 //! depend on their number. [`mod@reference`] is the slow oracle.

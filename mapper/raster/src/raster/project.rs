@@ -27,6 +27,8 @@ pub(super) struct Splat {
     pub(super) colour: [f32; 3],
     /// Camera z of the centre, metres.
     pub(super) depth: f32,
+    /// Its slope along u and v.
+    pub(super) tilt: [f32; 2],
 }
 
 /// The ellipse within which a splat is visible, relative to its centre, pixels.
@@ -88,6 +90,9 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
     let drawn = drawn.to_bitmask();
     let (c, w, rgb) = (&lanes.centre, &lanes.whitening, &lanes.colour);
     let scale = (0.5 * LOG2_E).sqrt();
+    // From slopes along the axes of the image to those along u and v.
+    let along_u = lanes.tilt[0] / w[0];
+    let along_v = (lanes.tilt[1] - w[1] * along_u) / w[2];
     let splat = [
         c[0],
         c[1],
@@ -99,9 +104,11 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
         rgb[1],
         rgb[2],
         lanes.x_camera[2],
+        along_u / scale,
+        along_v / scale,
     ];
     for (lane, out) in out.iter_mut().enumerate() {
-        let s: [f32; 10] = each(
+        let s: [f32; 12] = each(
             #[inline(always)]
             |k| splat[k][lane],
         );
@@ -116,6 +123,7 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
                 opacity: s[5],
                 colour: [s[6], s[7], s[8]],
                 depth: s[9],
+                tilt: [s[10], s[11]],
             },
             extent: Extent { radius: [e[0], e[1]], half_height: e[2], lean: e[3], top: e[4] },
             depth_key: if drawn >> lane & 1 == 1 { s[9].to_bits() } else { NOT_DRAWN },

@@ -6,7 +6,7 @@ use fearless_simd::{Level, dispatch, f32x8, mask32x8, prelude::*};
 
 use super::backward::SplatSums;
 use super::bin::Bins;
-use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, each, load};
+use super::lanes::{LANES, LaneMatrix, Lanes, ViewNumbers, dot3, each, load, symmetric};
 use super::reduce::{SUMS, reduce};
 use crate::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, PARAMETERS, PlanesMut, ROTATION};
 
@@ -46,6 +46,8 @@ struct BySplat<S: Simd> {
     opacity_logit: f32x8<S>,
     colour: [f32x8<S>; 3],
     depth: f32x8<S>,
+    /// By the covariance of the offset on the image with camera z.
+    with_z: [f32x8<S>; 2],
 }
 
 /// Adds the gradients of the Gaussians `first..` to `out`, and returns what they give to the pose.
@@ -123,9 +125,12 @@ fn add<S: Simd>(
 impl<S: Simd> BySplat<S> {
     /// From the sums of [`SplatSums`]. With `w = W d` the offset d in units of standard deviations, the gradient
     /// by the centre is `W^T sum(s w)`, that by the covariance `W^T sum(s w w^T) W / 2`.
+    ///
+    /// What depth adds: it is `z + t^T d` with the tilt `t = C^-1 c`, c the covariance with camera z. With
+    /// `h = C^-1 sum(g d)` the gradient by c is h, that by the covariance `-h t^T`, that by the centre `-t sum(g)`.
     #[inline(always)]
     fn new(simd: S, lanes: &Lanes<S>, sums: &[[f32; LANES]; SUMS]) -> Self {
-        let [s, su, sv, suu, suv, svv, red, green, blue, depth] = each(
+        let [s, su, sv, suu, suv, svv, red, green, blue, depth, gu, gv] = each(
             #[inline(always)]
             |k| f32x8::from_slice(simd, &sums[k]),
         );
@@ -137,12 +142,24 @@ impl<S: Simd> BySplat<S> {
         );
         let up = suu * p;
         let (uq, vq) = (suu * q + suv * r, suv * q + svv * r);
+        let [tilt_x, tilt_y] = lanes.tilt;
+        // Offsets are u and v over the pixels' unit, and p, q and r have it as a factor.
+        let (gu, gv) = (gu * (unit * unit), gv * (unit * unit));
+        let gy = gv / r;
+        let gx = (gu - q * gy) / p;
+        let with_z = symmetric(&lanes.tilt_inverse, &[gx, gy]);
+        let [hx, hy] = with_z;
         Self {
-            centre: [p * su, q * su + r * sv],
-            covariance: [p * up * 0.5, p * uq, (q * uq + r * vq) * 0.5],
+            centre: [p * su - tilt_x * depth, q * su + r * sv - tilt_y * depth],
+            covariance: [
+                p * up * 0.5 - hx * tilt_x,
+                p * uq - (hx * tilt_y + hy * tilt_x),
+                (q * uq + r * vq) * 0.5 - hy * tilt_y,
+            ],
             opacity_logit: s * (lanes.opacity_slope / lanes.opacity),
             colour: [red, green, blue],
             depth,
+            with_z,
         }
     }
 }
@@ -174,7 +191,7 @@ impl<S: Simd> Lanes<S> {
                 ),
                 each(
                     #[inline(always)]
-                    |j| -(v[j] * x + w[j] * y),
+                    |j| self.by_along(by_splat, j) - (v[j] * x + w[j] * y),
                 ),
             ]
         };
@@ -198,20 +215,29 @@ impl<S: Simd> Lanes<S> {
         (by_parameters, self.by_view(&by_axes_camera, &by_x_camera))
     }
 
-    /// By the axes on the image: twice the gradient by the covariance, times the axes.
+    /// By the camera z of axis `j` through the covariance with it.
+    #[inline(always)]
+    fn by_along(&self, by_splat: &BySplat<S>, j: usize) -> f32x8<S> {
+        let [v, w] = &self.axes_image;
+        by_splat.with_z[0].mul_add(v[j], by_splat.with_z[1] * w[j])
+    }
+
+    /// By the axes on the image: twice the gradient by the covariance, times the axes, and that by the covariance with
+    /// camera z, times the camera z of the axes.
     #[inline(always)]
     fn by_axes_image(&self, by_splat: &BySplat<S>) -> LaneMatrix<S, 2, 3> {
         let [xx, xy, yy] = by_splat.covariance;
         let (xx, yy) = (xx + xx, yy + yy);
         let [v, w] = &self.axes_image;
+        let (along, [hx, hy]) = (&self.axes_camera[2], by_splat.with_z);
         [
             each(
                 #[inline(always)]
-                |j| xx.mul_add(v[j], xy * w[j]),
+                |j| hx.mul_add(along[j], xx.mul_add(v[j], xy * w[j])),
             ),
             each(
                 #[inline(always)]
-                |j| xy.mul_add(v[j], yy * w[j]),
+                |j| hy.mul_add(along[j], xy.mul_add(v[j], yy * w[j])),
             ),
         ]
     }

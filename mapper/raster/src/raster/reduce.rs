@@ -5,8 +5,8 @@ use super::bin::Bins;
 use super::lanes::LANES;
 use super::order::NO_RANK;
 
-/// Number of sums that are used.
-pub(super) const SUMS: usize = 10;
+/// Number of sums of a splat.
+pub(super) const SUMS: usize = 12;
 
 /// The sums of eight Gaussians over all tiles, in the order of the tiles; zero for those that are not drawn.
 /// Returns whether any is drawn.

@@ -53,7 +53,7 @@ pub(super) fn composite(
         }
         let weight = alpha * transmittance;
         pixel.colour += weight * splat.colour;
-        pixel.depth += weight * splat.depth;
+        pixel.depth += weight * splat.depth_at(&offset);
         let contribution = Contribution { splat: index, offset, alpha, alpha_by_logarithm, transmittance };
         pixel.contributions.push(contribution);
         transmittance = behind;
@@ -61,6 +61,13 @@ pub(super) fn composite(
     pixel.colour += transmittance * background;
     pixel.alpha = 1.0 - transmittance;
     pixel
+}
+
+impl Splat {
+    /// Camera z at an offset from the centre.
+    fn depth_at(&self, offset: &Vector2<f64>) -> f64 {
+        self.depth + self.tilt.dot(offset)
+    }
 }
 
 /// Alpha after ceiling and cutoff, and its derivative by `ln raw`; `None` if the splat is skipped.
@@ -100,13 +107,17 @@ impl Pixel {
             let gradient = &mut gradients[contribution.splat];
             let weight = contribution.alpha * contribution.transmittance;
             gradient.colour += weight * by_pixel.colour;
-            gradient.depth += weight * by_pixel.depth;
+            let offset = contribution.offset;
+            let by_depth = weight * by_pixel.depth;
+            gradient.depth += by_depth;
+            gradient.tilt += by_depth * offset;
+            gradient.centre -= by_depth * splat.tilt;
 
-            let own = by_pixel.colour.dot(&splat.colour) + by_pixel.depth * splat.depth + by_pixel.alpha;
+            let depth = splat.depth_at(&offset);
+            let own = by_pixel.colour.dot(&splat.colour) + by_pixel.depth * depth + by_pixel.alpha;
             let by_alpha = contribution.transmittance * (own - behind);
             let by_logarithm = by_alpha * contribution.alpha_by_logarithm;
             gradient.opacity += by_logarithm / splat.opacity;
-            let offset = contribution.offset;
             gradient.centre += by_logarithm * (splat.conic * offset);
             gradient.conic[0] -= by_logarithm * 0.5 * offset.x * offset.x;
             gradient.conic[1] -= by_logarithm * offset.x * offset.y;

@@ -104,8 +104,10 @@ pub struct SplatGradient {
     pub opacity: f64,
     /// By the colour.
     pub colour: Vector3<f64>,
-    /// By the camera z that is composited into the depth.
+    /// By the camera z of the centre, as far as it is composited into the depth.
     pub depth: f64,
+    /// By the change of depth, metres per pixel to the right and down.
+    pub tilt: Vector2<f64>,
 }
 
 /// Gradients of a loss by everything that was rendered.

@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3, Vector4};
 
 use super::{ReferenceGaussian, ReferenceGradient, SplatGradient};
-use crate::raster::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, NEAR_PLANE};
+use crate::raster::constants::{FAR_PLANE, LOW_PASS, MAX_COLOUR, NEAR_PLANE, TILT_LOW_PASS};
 use crate::raster::pose::ViewGradient;
 use crate::raster::view::RasterView;
 
@@ -17,6 +17,8 @@ pub(super) struct Splat {
     pub(super) colour: Vector3<f64>,
     /// Camera z of the centre, metres.
     pub(super) depth: f64,
+    /// Metres per pixel at which it changes.
+    pub(super) tilt: Vector2<f64>,
 }
 
 /// All intermediate values of a projection.
@@ -34,6 +36,9 @@ struct Steps {
     axes_world: Matrix3<f64>,
     axes_camera: Matrix3<f64>,
     conic: Matrix2<f64>,
+    /// Inverse covariance with the low-pass of the tilt, and the tilt.
+    tilt_conic: Matrix2<f64>,
+    tilt: Vector2<f64>,
 }
 
 /// The splat of a Gaussian, or `None` if it is not drawn: behind the camera, too near or too far, or with a parameter that
@@ -43,7 +48,8 @@ pub(super) fn project(gaussian: &ReferenceGaussian, view: &RasterView) -> Option
     let camera = &view.camera;
     let [x, y, z] = steps.x_camera.into();
     let centre = Vector2::new(camera.fx * x / z + camera.cx, camera.fy * y / z + camera.cy);
-    let finite = centre.iter().chain(&steps.conic).chain(&gaussian.colour).all(|v| v.is_finite());
+    let finite =
+        centre.iter().chain(&steps.conic).chain(&steps.tilt).chain(&gaussian.colour).all(|v| v.is_finite());
     let opaque = gaussian.opacity > 0.0 && gaussian.opacity <= 1.0;
     let in_range = z > NEAR_PLANE && z < FAR_PLANE && gaussian.colour.amax() < MAX_COLOUR;
     (in_range && finite && opaque).then_some(Splat {
@@ -52,6 +58,7 @@ pub(super) fn project(gaussian: &ReferenceGaussian, view: &RasterView) -> Option
         opacity: gaussian.opacity,
         colour: gaussian.colour,
         depth: z,
+        tilt: steps.tilt,
     })
 }
 
@@ -65,10 +72,17 @@ pub(super) fn project_backward(
     let steps = Steps::new(gaussian, view);
     let [gxx, gxy, gyy] = splat.conic;
     let by_conic = Matrix2::new(gxx, 0.5 * gxy, 0.5 * gxy, gyy);
+    let image_axes = steps.jacobian * steps.axes_camera;
+    // The tilt is the inverse of one covariance times another, that of the offset on the image with camera z.
+    let by_covariance_with_z = steps.tilt_conic * splat.tilt;
+    let by_tilt_covariance = -by_covariance_with_z * steps.tilt.transpose();
     let by_covariance = -steps.conic * by_conic * steps.conic;
-    let by_image_axes = 2.0 * by_covariance * (steps.jacobian * steps.axes_camera);
+    let by_image_axes = 2.0 * by_covariance * image_axes
+        + (by_tilt_covariance + by_tilt_covariance.transpose()) * image_axes
+        + by_covariance_with_z * steps.axes_camera.row(2);
     let by_jacobian = by_image_axes * steps.axes_camera.transpose();
-    let by_axes_camera = steps.jacobian.transpose() * by_image_axes;
+    let mut by_axes_camera = steps.jacobian.transpose() * by_image_axes;
+    by_axes_camera.set_row(2, &(by_axes_camera.row(2) + by_covariance_with_z.transpose() * image_axes));
     let by_axes_world = steps.world_to_camera.transpose() * by_axes_camera;
     let by_x_camera = steps.by_x_camera(view, splat, &by_jacobian);
 
@@ -103,10 +117,10 @@ impl Steps {
         let axes_world = orientation * Matrix3::from_diagonal(&gaussian.scale);
         let axes_camera = world_to_camera * axes_world;
         let image_axes = jacobian * axes_camera;
-        let covariance = image_axes * image_axes.transpose() + Matrix2::from_diagonal_element(LOW_PASS);
-        let determinant = covariance.determinant();
-        let conic =
-            Matrix2::new(covariance.m22, -covariance.m12, -covariance.m21, covariance.m11) / determinant;
+        let covariance = image_axes * image_axes.transpose();
+        let conic = inverse(&(covariance + Matrix2::from_diagonal_element(LOW_PASS)));
+        let tilt_conic = inverse(&(covariance + Matrix2::from_diagonal_element(TILT_LOW_PASS)));
+        let tilt = tilt_conic * (image_axes * axes_camera.row(2).transpose());
         Self {
             world_to_camera,
             x_camera,
@@ -119,6 +133,8 @@ impl Steps {
             axes_world,
             axes_camera,
             conic,
+            tilt_conic,
+            tilt,
         }
     }
 
@@ -161,6 +177,10 @@ impl Steps {
         let radial = self.quaternion.dot(&by_unit);
         ((by_unit - self.quaternion * radial) / self.quaternion_norm).into()
     }
+}
+
+fn inverse(matrix: &Matrix2<f64>) -> Matrix2<f64> {
+    Matrix2::new(matrix.m22, -matrix.m12, -matrix.m21, matrix.m11) / matrix.determinant()
 }
 
 /// Rotation matrix of a unit quaternion w x y z.

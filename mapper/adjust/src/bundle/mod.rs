@@ -8,6 +8,7 @@ mod adam;
 mod adjustment;
 mod brightness;
 mod density;
+mod disc;
 mod field_map;
 mod frame_state;
 mod gaussian_loss;

@@ -1,12 +1,15 @@
-//! New Gaussians from a frame with depth, where the map has nothing yet.
+//! New Gaussians from a frame with depth, where the map has nothing yet: flat ones that lie on the surface.
+//!
+//! Balls would be a fog of the thickness of a square, in front of which the surface is never seen.
 
 use mba_map::infill;
 use mba_raster::gaussians::{Gaussian, Gaussians};
 use mba_raster::sensor::Observation;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::photometric::InverseResponse;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
+use super::disc::Disc;
 use super::seed_view::{DepthSource, SeedView};
 use super::smooth_depth::smooth_depth;
 
@@ -18,8 +21,12 @@ const SMALLEST: usize = 2;
 const DETAIL: f32 = 0.03;
 /// Ratio of the largest to the smallest depth above which a square is divided.
 const STEP: f32 = 1.05;
-/// Standard deviation of a Gaussian across the surface, as a fraction of the side of its square.
+/// Standard deviation of the picture of a Gaussian, as a fraction of the side of its square.
 const SPREAD: f32 = 0.5;
+/// Pixels to each side over which the slope of the surface is found, for squares that reach less far.
+const SLOPE_RADIUS: usize = 6;
+/// Depths that differ from that of a square by less than this share of it belong to its surface.
+const SAME_SURFACE: f32 = 0.05;
 /// Opacity of a new Gaussian.
 const OPACITY: f32 = 0.9;
 /// A pixel is covered where the map's alpha is larger.
@@ -167,15 +174,40 @@ impl Squares<'_> {
         Look { mean_light: light.map(|sum| sum / count), deviation, depth }
     }
 
+    /// Metres per pixel to the right and down at which the surface at a pixel recedes; none where too little is known of
+    /// it. Inverse depth is linear in pixels on a plane.
+    fn tilt(&self, [u, v]: [f32; 2], depth: f32, reach: usize) -> [f64; 2] {
+        let (width, height) = (self.seen.camera.width, self.seen.camera.height);
+        let range = |middle: f32, end: usize| {
+            let middle = middle as usize;
+            middle.saturating_sub(reach)..(middle + reach + 1).min(end)
+        };
+        let (mut normal, mut right) = (Matrix3::<f64>::zeros(), Vector3::<f64>::zeros());
+        for y in range(v, height) {
+            for x in range(u, width) {
+                let z = self.depth[y * width + x];
+                if z > 0.0 && (z - depth).abs() < SAME_SURFACE * depth {
+                    let row = Vector3::new(1.0, f64::from(x as f32 - u), f64::from(y as f32 - v));
+                    normal += row * row.transpose();
+                    right += row / f64::from(z);
+                }
+            }
+        }
+        let plane = normal.cholesky().map_or_else(Vector3::zeros, |normal| normal.solve(&right));
+        let slope = -f64::from(depth).powi(2);
+        [slope * plane.y, slope * plane.z]
+    }
+
     fn gaussian(&self, [u, v]: [f32; 2], depth: f32, side: usize, colour: [f32; 3]) -> Gaussian {
         let camera = &self.seen.camera;
-        let point: Vector3<f64> = camera.ray(f64::from(u), f64::from(v)) * f64::from(depth);
-        let mean = self.world_from_camera.transform_point(&point).map(|x| x as f32).into();
-        let scale = SPREAD * side as f32 * depth / camera.fx as f32;
+        let tilt = self.tilt([u, v], depth, side.max(SLOPE_RADIUS));
+        let sigma = f64::from(SPREAD) * side as f64;
+        let disc = Disc::new(camera, [u, v].map(f64::from), f64::from(depth), tilt, sigma);
+        let rotation = self.world_from_camera.rotation * disc.rotation;
         Gaussian {
-            mean,
-            log_scale: [scale.ln(); 3],
-            rotation: [1.0, 0.0, 0.0, 0.0],
+            mean: self.world_from_camera.transform_point(&disc.mean).map(|x| x as f32).into(),
+            log_scale: disc.scale.map(|scale| scale.ln() as f32).into(),
+            rotation: [rotation.w, rotation.i, rotation.j, rotation.k].map(|q| q as f32),
             opacity_logit: (OPACITY / (1.0 - OPACITY)).ln(),
             colour,
         }

@@ -73,6 +73,7 @@ pub mod image;
 pub mod keyframe;
 pub mod math;
 pub mod photometric;
+mod session;
 pub mod simd;
 pub mod surface;
 mod tracker;
@@ -83,6 +84,7 @@ pub mod workspace;
 
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;
+pub use session::SessionError;
 pub use tracker::{
     Doubt, Effort, Frame, FrameResult, FrameStatus, GyroReading, MAX_RECENT_KEYFRAMES, Readout,
     ReferenceMode, ReferenceView, Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,

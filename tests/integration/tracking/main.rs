@@ -12,4 +12,5 @@ mod rolling;
 mod scenes;
 mod self_calibration;
 mod sequences;
+mod session;
 mod work;

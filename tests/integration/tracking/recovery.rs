@@ -1,6 +1,6 @@
 //! Lost and found again.
 
-use mba_tests::handheld::{camera_of_width, pose_error, track_anew, tracker_config};
+use mba_tests::handheld::{RenderedFrame, camera_of_width, pose_error, track_anew, tracker_config};
 use mba_tracker::FrameStatus;
 use mba_tracker::geometry::{RigidTransform, so3};
 use nalgebra::Vector3;
@@ -27,13 +27,16 @@ fn several_lost_frames_hold_the_pose_and_the_next_good_one_is_found() {
     }
 }
 
-#[test]
-fn an_older_keyframe_is_found_after_moving_back_unseen() {
-    // A pan of nearly the field of view to the left wall, which holds the camera sideways.
+/// Frames of the pan away in [`away_and_back`].
+const AWAY: usize = 12;
+
+/// A pan of nearly the field of view to the left wall, which holds the camera sideways; ten blind frames; the place where
+/// the pan began.
+pub(crate) fn away_and_back() -> Vec<RenderedFrame> {
     let at = |radians: f64| {
         RigidTransform::new(so3::exp(&(Vector3::y() * -radians)), Vector3::new(-0.3 * radians, 0.0, 0.0))
     };
-    let away = 12;
+    let away = AWAY;
     let mut frames: Vec<_> = (0..away).map(|k| still_frame(&ROOM, k, at(0.09 * k as f64))).collect();
     let blind = still_frame(&ROOM, 0, at(0.0)).replaced(|_| 0, |_, _| 0);
     for k in away..away + 10 {
@@ -44,6 +47,12 @@ fn an_older_keyframe_is_found_after_moving_back_unseen() {
     for k in away + 10..away + 14 {
         frames.push(still_frame(&ROOM, k, at(0.1 - 0.02 * (k - away - 10) as f64)));
     }
+    frames
+}
+
+#[test]
+fn an_older_keyframe_is_found_after_moving_back_unseen() {
+    let (away, frames) = (AWAY, away_and_back());
     let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
     assert!(results[1..away].iter().any(|result| result.is_keyframe), "no keyframe was replaced");
     assert!(results[away..away + 10].iter().all(|result| result.status == FrameStatus::Lost));

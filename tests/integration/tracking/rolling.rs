@@ -17,7 +17,7 @@ const SHAKE: Shake = Shake { metres: 0.05, radians: 0.16, hertz: 1.2 };
 const BAND: usize = 3;
 
 /// A frame at time `t` whose rows are exposed one after the other; its truth is that of the middle row.
-fn rolling_frame(camera: &PinholeCamera, t: f64) -> RenderedFrame {
+pub(crate) fn rolling_frame(camera: &PinholeCamera, t: f64) -> RenderedFrame {
     let at = |t: f64| RenderedFrame::new(&ROOM, camera, t, EXPOSURE, SHAKE.exposure(t, EXPOSURE));
     let mut frame = at(t);
     for first in (0..camera.height).step_by(BAND) {

@@ -13,6 +13,7 @@ pub use line_blur::blur_along;
 use fearless_simd::{Level, dispatch, f32x8, prelude::*};
 
 use crate::math::sqrt_f32;
+use crate::session::{Walk, are_finite};
 use crate::transfer::MAX_VIRTUAL_VIEWS;
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
@@ -73,6 +74,16 @@ impl<'m> DeblurScratch<'m> {
         if !self.captured.is_empty() {
             self.captured.copy_from_slice(image);
         }
+    }
+
+    /// Visits the image as captured; all else serves within a call.
+    pub(crate) fn walk(&mut self, walk: &mut Walk<'_>) {
+        walk.values(self.captured);
+    }
+
+    /// Whether what was restored can be worked with.
+    pub(crate) fn is_sound(&self) -> bool {
+        are_finite(self.captured)
     }
 
     /// Writes back the image as captured, if it is remembered.

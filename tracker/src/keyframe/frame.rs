@@ -6,9 +6,10 @@ use fearless_simd::Level;
 use super::rolling_fusion::fuse_rolling_depth;
 use super::select::{Keypoint, SelectionSettings, select_keypoints};
 use crate::geometry::{PinholeCamera, RigidTransform};
-use crate::image::{GreyPyramid, MAX_LEVELS, PixelRectangle};
+use crate::image::{GreyLevel, GreyPyramid, MAX_LEVELS, PixelRectangle};
+use crate::session::{Walk, are_finite};
 use crate::surface::{InverseDepthMap, SurfacePlanes, fuse_depth};
-use crate::trajectory::{BowedTrajectory, FrameTiming};
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
 
 /// Upper bound of keypoints per pyramid level.
@@ -189,5 +190,63 @@ impl<'m> Keyframe<'m> {
         self.timing = other.timing;
         self.blur = other.blur / (1u32 << skip) as f32;
         self.frame_index = other.frame_index;
+    }
+
+    /// Visits all of the keyframe.
+    pub(crate) fn walk(&mut self, walk: &mut Walk<'_>) {
+        self.counts.iter_mut().for_each(|count| walk.count(count));
+        self.pyramid.levels.iter_mut().for_each(|level| walk.values(level.pixels));
+        walk.values(self.depth.values);
+        let SurfacePlanes { value, slope_u, slope_v, width: _, height: _ } = &mut self.planes;
+        [value, slope_u, slope_v].into_iter().for_each(|figures| walk.values(figures));
+        walk.values(self.weights);
+        for (keypoints, count) in self.keypoints.iter_mut().zip(self.counts) {
+            let count = count.min(keypoints.len());
+            walk.values(&mut keypoints[..count]);
+        }
+        walk.count(&mut self.fusions);
+        walk.pose(&mut self.world_from_keyframe);
+        let still = ExposureTrajectory::still(RigidTransform::identity());
+        walk.option(&mut self.keyframe_from_camera, BowedTrajectory::without_bow(still), Walk::path);
+        walk.timing(&mut self.timing);
+        walk.value(&mut self.blur);
+        walk.count(&mut self.frame_index);
+    }
+
+    /// Leaves a keyframe that shows nothing, whatever it held.
+    pub(crate) fn forget(&mut self) {
+        self.counts = [0; MAX_LEVELS];
+        self.fusions = 0;
+        self.pyramid.levels.iter_mut().for_each(|level| level.pixels.fill(0.0));
+        let SurfacePlanes { value, slope_u, slope_v, width: _, height: _ } = &mut self.planes;
+        let maps = [&mut *self.depth.values, value, slope_u, slope_v, self.weights];
+        maps.into_iter().for_each(|values| values.fill(0.0));
+        self.world_from_keyframe = RigidTransform::identity();
+        self.keyframe_from_camera = None;
+        self.timing = FrameTiming::GLOBAL;
+    }
+
+    /// Whether a keyframe that was restored can be worked with.
+    pub(crate) fn is_sound(&self) -> bool {
+        let level_is_sound = |(level, (keypoints, count)): (&GreyLevel<'_>, (&&mut [Keypoint], usize))| {
+            let is_inside = |keypoint: &Keypoint| {
+                let Keypoint { u, v, inverse_depth, strength } = *keypoint;
+                (0.0..level.width as f32).contains(&u)
+                    && (0.0..level.height as f32).contains(&v)
+                    && are_finite(&[inverse_depth, strength])
+            };
+            are_finite(level.pixels)
+                && keypoints.get(..count).is_some_and(|keypoints| keypoints.iter().all(is_inside))
+        };
+        let paths_are_sound = self
+            .keyframe_from_camera
+            .is_none_or(|path| path.linear.start.is_valid() && path.linear.end.is_valid());
+        let planes = &self.planes;
+        self.pyramid.levels.iter().zip(self.keypoints.iter().zip(self.counts)).all(level_is_sound)
+            && self.depth.values.iter().all(|rho| rho.is_finite() && *rho >= 0.0)
+            && [&*planes.value, planes.slope_u, planes.slope_v, self.weights].into_iter().all(are_finite)
+            && self.world_from_keyframe.is_valid()
+            && paths_are_sound
+            && self.fusions < usize::MAX / 2
     }
 }

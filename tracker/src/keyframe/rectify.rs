@@ -10,6 +10,7 @@ use super::resample::{Shifts, resample};
 use super::row_views::{RowViews, pixel_of, ray_of};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::image::LevelImage;
+use crate::session::{Walk, are_finite};
 use crate::surface::InverseDepthMap;
 use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming};
 use crate::workspace::{Arena, WorkspaceError, slice_bytes};
@@ -89,6 +90,17 @@ impl<'m> RectifyScratch<'m> {
         if !self.depth.is_empty() {
             depth.copy_from_slice(self.depth);
         }
+    }
+
+    /// Visits the keyframe as it was captured; shifts serve within a call.
+    pub(crate) fn walk(&mut self, walk: &mut Walk<'_>) {
+        walk.values(self.image);
+        walk.values(self.depth);
+    }
+
+    /// Whether what was restored can be worked with.
+    pub(crate) fn is_sound(&self) -> bool {
+        are_finite(self.image) && are_finite(self.depth)
     }
 
     /// Writes the remembered keyframe to `image` and `depth` as it would have been seen at the middle of its path

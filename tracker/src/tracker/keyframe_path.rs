@@ -7,6 +7,8 @@
 
 use nalgebra::SVector;
 
+use crate::session::Walk;
+
 /// Velocity and acceleration at the middle of a path: (translation, rotation) per second, then per square second.
 pub(super) type PathRate = SVector<f64, 12>;
 
@@ -27,6 +29,18 @@ impl PathError {
     /// Nothing is known but that the error has standard deviation `sigma`.
     pub(super) fn unknown(sigma: &PathRate) -> Self {
         Self { mean: PathRate::zeros(), weight: sigma.map(|sigma| 1.0 / (sigma * sigma)), frames: 0 }
+    }
+
+    /// Visits what is known.
+    pub(super) fn walk(&mut self, walk: &mut Walk<'_>) {
+        walk.vector(&mut self.mean);
+        walk.vector(&mut self.weight);
+        walk.count(&mut self.frames);
+    }
+
+    /// Whether what was restored can be worked with.
+    pub(super) fn is_sound(&self) -> bool {
+        self.mean.iter().chain(&self.weight).all(|number| number.is_finite()) && self.frames < usize::MAX / 2
     }
 
     /// Takes in the difference between a frame's velocity along its path and that of the mid poses around it, with

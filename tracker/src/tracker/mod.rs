@@ -14,6 +14,7 @@ mod policy;
 mod recovery;
 mod reference;
 mod result;
+mod session;
 mod track;
 
 pub use config::{

@@ -9,6 +9,7 @@ use super::history::Motion;
 use crate::align::{AlignScratch, AlignSettings, Alignment, FrameData, ReferenceData};
 use crate::geometry::{PinholeCamera, RigidTransform};
 use crate::keyframe::{Keyframe, typical_inverse_depth};
+use crate::session::Walk;
 use crate::transfer::BrightnessModel;
 use crate::work::Work;
 use crate::workspace::{Arena, WorkspaceError};
@@ -58,6 +59,21 @@ impl<'m> RecentKeyframes<'m> {
             self.filled = (self.filled + 1).min(self.slots.len());
             self.next = (self.next + 1) % self.slots.len();
         }
+    }
+
+    /// Visits the remembered keyframes.
+    pub(super) fn walk(&mut self, walk: &mut Walk<'_>) {
+        walk.count(&mut self.filled);
+        walk.count(&mut self.next);
+        let filled = self.filled.min(self.slots.len());
+        self.slots[..filled].iter_mut().for_each(|slot| slot.walk(walk));
+    }
+
+    /// Whether what was restored can be worked with.
+    pub(super) fn is_sound(&self) -> bool {
+        // The first slots are filled first.
+        let is_in_ring = self.next < self.slots.len().max(1);
+        is_in_ring && self.slots.get(..self.filled).is_some_and(|slots| slots.iter().all(Keyframe::is_sound))
     }
 
     /// Moves the remembered keyframes to another world.

@@ -199,6 +199,7 @@ impl<'m> Tracker<'m> {
         self.lost_at_start = 0;
         self.gyro_bias = Vector3::zeros();
         self.keyframe_gyro = None;
+        self.deblurred_with = Vector6::zeros();
     }
 
     fn check(&self, frame: &Frame) -> Result<(), FrameError> {
@@ -233,8 +234,8 @@ impl<'m> Tracker<'m> {
         let mut result = FrameResult::of(self.frames, frame.timestamp, still, &nothing);
         self.promote(&origin, None, f32::MAX);
         let PinholeCamera { width, height, .. } = self.config.camera;
-        // Small images have fewer cells than that; a third of them must show something.
-        let needed = MIN_START_KEYPOINTS.min(max_keypoints(width, height, 0) / 3);
+        // Small images have fewer cells than that; a sixth of them must show something.
+        let needed = MIN_START_KEYPOINTS.min(max_keypoints(width, height, 0) / 6);
         let enough = self.keyframe.finest_keypoints().len() >= needed;
         let in_range = self.keyframe.depth.mean().is_some_and(|rho| START_INVERSE_DEPTH.contains(&rho));
         result.doubt = Some(Doubt::NoStart);

@@ -8,6 +8,7 @@ pub mod synth;
 mod values;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
@@ -15,7 +16,7 @@ use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 
 pub use values::{BlurMode, Switch};
-use values::{non_negative, positive, size, virtual_views};
+use values::{non_negative, positive, seconds, size, virtual_views};
 
 /// Most worker threads: several for every core of the largest machines.
 pub const MOST_THREADS: u16 = 1024;
@@ -143,7 +144,7 @@ pub struct Calibrate {
 #[command(after_help = "\
 RUN gets trajectory.txt (TUM lines at mid exposure), exposures.txt (poses at opening, middle and closing), \
 frames.csv, summary.json and deblurred/, the keyframes without their blur. It is kept up to date while the \
-run goes on.
+run goes on. A run that was stopped, by a kill too, goes on with --resume and ends with the same files as one that was not.
 
 Examples:
   mba track rgbd_dataset_freiburg1_rpy --out run
@@ -158,6 +159,12 @@ pub struct Track {
     /// Write also over what this program did not write; never over a data set
     #[arg(long)]
     pub force: bool,
+    /// Go on from the checkpoint in RUN, if there is one
+    #[arg(long)]
+    pub resume: bool,
+    /// Seconds between two checkpoints; 0 for one after every frame
+    #[arg(long, value_name = "S", default_value = "20", value_parser = seconds)]
+    pub checkpoint_interval: Duration,
     /// Choices about the tracker
     #[command(flatten)]
     pub tracking: Tracking,

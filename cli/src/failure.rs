@@ -6,6 +6,7 @@ use std::io;
 use std::path::Path;
 
 use mba_mapper::FileError;
+use mba_mapper::checkpoint::CheckpointError;
 use mba_mapper::output::OutputError;
 use mba_mapper::run::RunError;
 
@@ -165,6 +166,9 @@ pub fn is_disk_full(error: &(dyn Error + 'static)) -> bool {
         Some(RunError::DiskFull { .. }) => return true,
         Some(RunError::Output(error)) => return of_output(error),
         _ => {}
+    }
+    if let Some(CheckpointError::File(error)) = error.downcast_ref() {
+        return of_file(error);
     }
     error.downcast_ref().is_some_and(of_file)
         || error.downcast_ref().is_some_and(of_output)

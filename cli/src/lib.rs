@@ -42,6 +42,7 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// # Errors
 /// Whatever stops the command; [`failure::exit_code`] tells bad input from failure.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
+    interrupt::watch();
     let console = Console::new(&cli.global);
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(cli.global.threads)).build()?;
     pool.install(|| dispatch(&cli.command, &console))

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::output::{OutputError, OutputFolder, Permission};
-use mba_mapper::run::{RunCamera, RunSettings, Summary};
+use mba_mapper::run::{RunCamera, RunSettings, Summary, stored_path};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -67,7 +67,7 @@ pub fn settings(dataset: &Dataset, options: &Value) -> RunSettings {
 /// `path` for somebody who looks at the run from another directory.
 #[must_use]
 pub fn absolute(path: &Path) -> String {
-    path.canonicalize().unwrap_or_else(|_| path.to_owned()).display().to_string()
+    stored_path(&path.canonicalize().unwrap_or_else(|_| path.to_owned()))
 }
 
 /// A limit that is chosen by the program unless it is given.

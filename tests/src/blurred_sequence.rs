@@ -196,3 +196,25 @@ pub fn assert_same_map(one: &Path, two: &Path) {
         assert!(bytes(&one.join(&file)) == bytes(&two.join(&file)), "{} differs", file.display());
     }
 }
+
+/// Asserts that two finished runs of the tracker are alike in every byte but those that tell how long it took.
+///
+/// # Panics
+/// When they differ.
+pub fn assert_same_track(one: &Path, two: &Path) {
+    for file in ["exposures.txt", "trajectory.txt"] {
+        assert!(bytes(&one.join(file)) == bytes(&two.join(file)), "{file} differs");
+    }
+    let images = names(&one.join("deblurred"));
+    assert_eq!(images, names(&two.join("deblurred")));
+    for image in images.iter().map(|name| Path::new("deblurred").join(name)) {
+        assert!(bytes(&one.join(&image)) == bytes(&two.join(&image)), "{} differs", image.display());
+    }
+    let [one, two] = [one, two].map(|folder| Run::open(folder).expect("a run"));
+    let untimed = |run: &Run| -> Vec<String> {
+        run.frames.iter().map(|frame| format!("{:?}", FrameRecord { ms: 0.0, ..*frame })).collect()
+    };
+    assert_eq!(untimed(&one), untimed(&two));
+    let untimed = |run: &Run| Summary { milliseconds: None, ..run.summary.clone() };
+    assert_eq!(untimed(&one), untimed(&two));
+}

@@ -7,6 +7,7 @@ use super::{calibrate, open, slam};
 use crate::args::slam::{Ablate, Ablation, MapReference, Slamming};
 use crate::args::{BlurMode, Switch};
 use crate::console::Console;
+use crate::interrupt::Resumption;
 
 /// Virtual views of the row that has few.
 const FEW_VIEWS: usize = 3;
@@ -39,7 +40,7 @@ pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
             None => {
                 console.note(format!("{name}:"));
                 let slamming = Slamming { ablation, ..Slamming::default() };
-                slam::slam_into(&dataset, &out, (false, true), &slamming, console)?
+                slam::slam_into(&dataset, &out, (false, Resumption::Always), &slamming, console)?
             }
         };
         rows.push(Row::new(name, &summary));

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use mba_mapper::dataset::Dataset;
+use mba_mapper::mapping::MapSettings;
 use mba_mapper::run::Run;
 use mba_mapper::synth::{DepthSensor, NoiseModel, SynthConfig};
 
@@ -10,6 +11,7 @@ use super::{map, open, synth, track};
 use crate::args::map::Mapping;
 use crate::args::{Demo, Tracking};
 use crate::console::Console;
+use crate::interrupt::Resumption;
 use crate::report::{self, table};
 
 /// Synthesises a blurred sequence, tracks it, maps it, prints the figures of the map and writes its charts and report.
@@ -23,9 +25,11 @@ pub fn run(args: &Demo, console: &Console) -> anyhow::Result<()> {
     let tracked = args.out.join(format!("run-{name}"));
     let mapped = args.out.join(format!("mapped-{name}"));
     let dataset = sequence(config, &data, console)?;
-    track::track_into(&dataset, &tracked, false, &Tracking::default(), console)?;
+    let how = (false, Resumption::Never);
+    let interval = MapSettings::default().checkpoint_interval;
+    track::track_into(&dataset, &tracked, how, interval, &Tracking::default(), console)?;
     let run = Run::open(&tracked)?;
-    let summary = map::map_into(&dataset, &run, &mapped, false, &Mapping::default(), false, console)?;
+    let summary = map::map_into(&dataset, &run, &mapped, how, &Mapping::default(), console)?;
     let path = report::write(&Run::open(&mapped)?, Some(&dataset), false)?;
     console.result(&summary, table::summary)?;
     console.note(format!("open {} in a browser", path.display()));

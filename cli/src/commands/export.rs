@@ -10,7 +10,7 @@ use mba_mapper::export::{
 };
 use mba_mapper::map::{MAP_FILE, StoredMap};
 use mba_mapper::output::{ExportFolder, OutputFile, Permission};
-use mba_mapper::run::{EXPOSURES_FILE, FRAMES_FILE, Run, SUMMARY_FILE, TRAJECTORY_FILE};
+use mba_mapper::run::{EXPOSURES_FILE, FRAMES_FILE, Run, SUMMARY_FILE, TRAJECTORY_FILE, path_of};
 use serde::Serialize;
 
 use super::open;
@@ -58,7 +58,7 @@ fn inputs(args: &Export, run: &Run) -> Vec<PathBuf> {
 }
 
 fn data_set_folder(args: &Export, run: &Run) -> PathBuf {
-    args.dataset.clone().unwrap_or_else(|| run.summary.settings.dataset.clone().into())
+    args.dataset.clone().unwrap_or_else(|| path_of(&run.summary.settings.dataset))
 }
 
 /// Writes a file of poses.

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::evaluation::associate;
+use mba_mapper::self_calibration::depth_lag;
 use serde::Serialize;
 
 use super::camera_facts::CameraFacts;
@@ -115,6 +116,13 @@ fn warnings(dataset: &Dataset, camera: &CameraFacts, survey: Survey) -> Vec<Stri
     warnings.extend(grouped(survey.unreadable, dataset.folder()));
     if let Some(median) = survey.median_depth.filter(|median| !PLAUSIBLE_DEPTH.contains(median)) {
         warnings.push(format!("the median depth is {median} m: is depth_scale in raw units per metre?"));
+    }
+    warnings.extend(depth_lag(dataset).map(|lag| lag.to_string()));
+    if survey.black > 0 {
+        warnings.push(format!("{} of {} sampled colour images are black", survey.black, survey.sampled));
+    } else if survey.plain > 0 {
+        let (plain, sampled) = (survey.plain, survey.sampled);
+        warnings.push(format!("{plain} of {sampled} sampled colour images show nothing, all of one colour"));
     }
     if survey.without_depth > 0 {
         let (empty, sampled) = (survey.without_depth, survey.sampled);

@@ -12,7 +12,7 @@ use super::{calibrate, open};
 use crate::args::map::{Map, Mapping};
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
-use crate::interrupt;
+use crate::interrupt::{self, Resumption};
 use crate::report::table;
 use crate::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 
@@ -27,11 +27,13 @@ pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let run = open::run(&args.trajectory)?;
     let dataset = open::with_estimates(dataset, &run)?;
-    let summary = map_into(&dataset, &run, &args.out, args.force, &args.mapping, args.resume, console)?;
+    let how = (args.force, Resumption::Option(args.resume));
+    let summary = map_into(&dataset, &run, &args.out, how, &args.mapping, console)?;
     console.result(&summary, table::summary)
 }
 
 /// Maps `dataset` from the poses of `run` into the RUN folder `out`; with `force` also into a folder of others.
+/// It goes on from the checkpoint there if it is to be resumed.
 ///
 /// # Errors
 /// As [`run`].
@@ -39,12 +41,11 @@ pub fn map_into(
     dataset: &Dataset,
     run: &Run,
     out: &Path,
-    force: bool,
+    (force, resumption): (bool, Resumption),
     args: &Mapping,
-    resume: bool,
     console: &Console,
 ) -> anyhow::Result<Summary> {
-    interrupt::watch();
+    let _saving = interrupt::saving();
     let settings = MapSettings::from(args);
     let folder = claim(out, force, &[dataset.folder(), &run.folder])?;
     let progress = console.progress(PROGRESS_STEPS, "mapping");
@@ -53,11 +54,19 @@ pub fn map_into(
         progress.set_message(format!("mapping: {}, loss {:.4}, {:.1} dB", at.size, at.loss, at.psnr));
         interrupt::flow()
     };
-    let mapped = map_dataset(dataset, run, &settings, folder, resume, describe(dataset, run, args), observe);
+    let mapped = map_dataset(
+        dataset,
+        run,
+        &settings,
+        folder,
+        resumption.resumes(),
+        describe(dataset, run, args),
+        observe,
+    );
     progress.finish_and_clear();
     if let Err(MapError::Stopped) = mapped {
         let message = format!("stopped; {} holds the tracked poses and a checkpoint", out.display());
-        return Err(interrupted(message, format!("`{}` goes on", interrupt::command_to_go_on(true))));
+        return Err(interrupted(message, resumption.advice()));
     }
     let summary = mapped.or_else(|error| advise(error, run))?;
     calibrate::keep(dataset, out)?;

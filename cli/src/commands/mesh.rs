@@ -5,9 +5,10 @@ use std::time::Instant;
 
 use indicatif::ProgressBar;
 use mba_mapper::map::Scene;
+use mba_mapper::map::StoredMap;
 use mba_mapper::mesh::{MeshFormat, YAxis};
 use mba_mapper::output::{OutputFile, Permission};
-use mba_mapper::run::{FrameStatus, Run};
+use mba_mapper::run::{FrameStatus, Run, path_of};
 use mba_mapper::surfaces::{
     DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map,
 };
@@ -93,7 +94,10 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
 
 /// Claims the file for the mesh, before the work, and says what its format is.
 fn output(args: &Mesh, run: &Run) -> anyhow::Result<(OutputFile, MeshFormat)> {
-    let mut inputs: Vec<&Path> = vec![Path::new(&run.summary.settings.dataset)];
+    let dataset = path_of(&run.summary.settings.dataset);
+    let map = StoredMap::path(&run.folder);
+    let mut inputs: Vec<&Path> = vec![&dataset];
+    inputs.extend(map.as_deref());
     inputs.extend(args.align.as_deref());
     let permission = Permission { force: args.force, inputs: &inputs };
     let out = OutputFile::claim(&args.out, &permission, MeshFormat::is_own).or_else(refuse)?;

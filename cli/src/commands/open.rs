@@ -1,5 +1,6 @@
 //! Opening inputs with advice for what can go wrong.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
@@ -50,15 +51,15 @@ pub fn map(run: &Run) -> anyhow::Result<StoredMap> {
     StoredMap::read(&path).or_bad_input("restore the file, or map the sequence again")
 }
 
-fn advise<T, E>((hint, error): (&'static str, E)) -> anyhow::Result<T>
+fn advise<T, E>((hint, error): (impl Into<String>, E)) -> anyhow::Result<T>
 where
     E: std::error::Error + Send + Sync + 'static,
 {
     Err(error).or_bad_input(hint)
 }
 
-fn dataset_hint(error: &DatasetError) -> &'static str {
-    match error {
+fn dataset_hint(error: &DatasetError) -> Cow<'static, str> {
+    let hint = match error {
         DatasetError::File(_) => "correct that line or file",
         DatasetError::UnknownLayout { .. } => "give the folder that holds the lists of images",
         DatasetError::MissingCalibration { .. } => "see docs/formats.md for an example",
@@ -67,7 +68,17 @@ fn dataset_hint(error: &DatasetError) -> &'static str {
         }
         DatasetError::EmptyList { .. } => "the list needs lines `timestamp file`",
         DatasetError::NoAssociation { .. } => "write associations.txt to pair the images yourself",
+        DatasetError::TimestampUnit { per_second, .. } => {
+            return format!(
+                "divide all times of the data set by {per_second}, or give the frame_rate in the calibration if frames are that far apart"
+            )
+            .into();
+        }
+        DatasetError::DepthSize { .. } => {
+            "enlarge the depth images by repeating pixels, or reduce the colour images and the calibration to their size"
+        }
         DatasetError::SizeMismatch { .. } => "the calibration must be that of the stored image size",
         _ => "see `mba info --help` for what a data set needs",
-    }
+    };
+    hint.into()
 }

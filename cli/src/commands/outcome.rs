@@ -1,6 +1,6 @@
 //! Whether a run achieved anything, and why not.
 
-use mba_mapper::dataset::Dataset;
+use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::run::{FrameRecord, FrameStatus, Summary};
 
 use crate::console::Console;
@@ -11,9 +11,6 @@ const SAMPLED_FRAMES: usize = 16;
 
 /// A share of frames that are lost above which a finished run is worth a warning.
 const WORRYING_SHARE: f64 = 0.1;
-
-/// Mean of the stored colour values below which an image is black.
-const BLACK: f64 = 2.0;
 
 /// Advice for a recording that cannot be tracked.
 const HINT: &str = "`mba info DATASET` shows what the images hold";
@@ -50,30 +47,19 @@ pub fn failure(dataset: &Dataset, remark: &str) -> anyhow::Error {
 
 /// Why nothing can be tracked, in a sentence.
 fn reason(dataset: &Dataset) -> String {
-    let sampled = dataset.len().min(SAMPLED_FRAMES);
-    let (mut unreadable, mut first_error) = (0, None);
-    let (mut without_depth, mut black, mut readable) = (0, 0, 0);
-    for k in 0..sampled {
-        match dataset.frame(k * dataset.len() / sampled) {
-            Err(error) => {
-                unreadable += 1;
-                first_error.get_or_insert(error.to_string());
-            }
-            Ok(frame) => {
-                readable += 1;
-                without_depth += usize::from(frame.depth_is_empty());
-                let sum: f64 = frame.rgb.iter().map(|value| f64::from(*value)).sum();
-                black += usize::from(sum < BLACK * frame.rgb.len() as f64);
-            }
-        }
-    }
+    let Survey { sampled, unreadable, black, plain, without_depth, .. } = survey(dataset, SAMPLED_FRAMES);
+    let readable = sampled - unreadable.len();
     // A single frame that is good can be the first: nothing follows it that could be aligned.
     let is_all_but_one = |count: usize| count > 0 && count + 1 >= readable;
-    match first_error {
+    match unreadable.first() {
         Some(error) if readable < 2 => {
+            let unreadable = unreadable.len();
             format!("{unreadable} of {sampled} sampled frames cannot be read, the first because {error}")
         }
         _ if is_all_but_one(black) => format!("{black} of {readable} sampled colour images are black"),
+        _ if is_all_but_one(plain) => {
+            format!("{plain} of {readable} sampled colour images show nothing, all of one colour")
+        }
         _ if is_all_but_one(without_depth) => {
             format!("{without_depth} of {readable} sampled depth images hold no depth at all")
         }

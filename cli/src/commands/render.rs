@@ -7,7 +7,7 @@ use mba_mapper::evaluation::PoseAlignment;
 use mba_mapper::map::{MAP_FILE, StoredMap};
 use mba_mapper::output::{Permission, ViewFolder};
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
-use mba_mapper::run::{Run, RunCamera, Spread};
+use mba_mapper::run::{Run, RunCamera, Spread, path_of};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
 use serde::Serialize;
 
@@ -53,7 +53,7 @@ pub fn run(args: &Render, console: &Console) -> anyhow::Result<()> {
     }
     let poses = in_map_frame(&poses, alignment.as_ref());
     let names = poses.iter().enumerate().map(|(index, pose)| name(args.names, index, pose));
-    let inputs = [Path::new(&run.summary.settings.dataset), &run.folder];
+    let inputs = [&*path_of(&run.summary.settings.dataset), &run.folder];
     let permission = Permission { force: args.force, inputs: &inputs };
     let folder = ViewFolder::claim(&args.out, &permission, names).or_else(refuse)?;
     let written = render_all(&map, &camera, &poses, (args, &folder), console)?;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use mba_mapper::run::path_of;
 use serde::Serialize;
 
 use super::open;
@@ -21,7 +22,7 @@ struct Written {
 /// Bad input when the folder is not a run; failure when it cannot be written.
 pub fn run(args: &Report, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
-    let folder = args.dataset.clone().unwrap_or_else(|| run.summary.settings.dataset.clone().into());
+    let folder = args.dataset.clone().unwrap_or_else(|| path_of(&run.summary.settings.dataset));
     let dataset =
         if args.dataset.is_some() { Some(open::dataset(&folder)?) } else { open_if_there(&folder, console) };
     let path = report::write(&run, dataset.as_ref(), args.force)?;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mba_mapper::checkpoint::CheckpointError;
-use mba_mapper::dataset::{Dataset, Warning};
+use mba_mapper::dataset::Dataset;
 use mba_mapper::mapping::MapError;
 use mba_mapper::run::{RunError, RunSettings, Summary};
 use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
@@ -13,8 +13,8 @@ use serde_json::json;
 use super::{calibrate, open, outcome};
 use crate::args::slam::{Slam, Slamming};
 use crate::console::Console;
-use crate::failure::{OrBadInput, bad_input, interrupted, is_disk_full};
-use crate::interrupt;
+use crate::failure::{OrBadInput, interrupted, is_disk_full};
+use crate::interrupt::{self, Resumption};
 use crate::report::table;
 use crate::written_run::{self, CAMERA_HINT, OUT_HINT, announce, claim, name, or_auto};
 
@@ -27,30 +27,26 @@ const REFINEMENT_STEPS: u64 = 1000;
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
 pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
-    if args.slamming.realtime
-        && let Some(warning) = dataset.warnings().iter().find(|w| matches!(w, Warning::TimestampUnit { .. }))
-    {
-        let hint = "correct the timestamps, or leave --realtime out";
-        return Err(bad_input(format!("frames cannot come by their times: {warning}"), hint));
-    }
     let dataset = calibrate::completed(dataset, args.slamming.self_calibrate, console)?;
-    let summary = slam_into(&dataset, &args.out, (args.force, args.resume), &args.slamming, console)?;
+    let resumption = if args.slamming.realtime { Resumption::Never } else { Resumption::Option(args.resume) };
+    let how = (args.force, resumption);
+    let summary = slam_into(&dataset, &args.out, how, &args.slamming, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Tracks and maps `dataset` into the RUN folder `out`; with `force` also into a folder of others. With
-/// `resume`, goes on from the checkpoint there.
+/// Tracks and maps `dataset` into the RUN folder `out`; with `force` also into a folder of others. It
+/// goes on from the checkpoint there if it is to be resumed.
 ///
 /// # Errors
 /// As [`run`].
 pub fn slam_into(
     dataset: &Dataset,
     out: &Path,
-    (force, resume): (bool, bool),
+    (force, resumption): (bool, Resumption),
     args: &Slamming,
     console: &Console,
 ) -> anyhow::Result<Summary> {
-    interrupt::watch();
+    let _saving = interrupt::saving();
     let folder = claim(out, force, &[dataset.folder()])?;
     let progress = console.progress(dataset.len(), "frames");
     let observe = |at: SlamProgress| {
@@ -67,14 +63,18 @@ pub fn slam_into(
         }
         interrupt::flow()
     };
-    let finished =
-        run_slam(dataset, &SlamSettings::from(args), folder, resume, describe(dataset, args), observe);
+    let finished = run_slam(
+        dataset,
+        &SlamSettings::from(args),
+        folder,
+        resumption.resumes(),
+        describe(dataset, args),
+        observe,
+    );
     progress.finish_and_clear();
     if let Err(SlamError::Stopped) = finished {
         let message = format!("stopped; {} holds the frames so far, marked as incomplete", out.display());
-        let goes_on = if args.realtime { "starts again" } else { "goes on" };
-        let command = interrupt::command_to_go_on(!args.realtime);
-        return Err(interrupted(message, format!("`{command}` {goes_on}")));
+        return Err(interrupted(message, resumption.advice()));
     }
     let summary = finished.or_else(|error| advise(error, dataset))?;
     calibrate::keep(dataset, out)?;

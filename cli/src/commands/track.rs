@@ -1,19 +1,31 @@
 //! `mba track`.
 
+use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 
 use mba_mapper::dataset::Dataset;
 use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary, write_deblurred_keyframes};
-use mba_mapper::tracking::{TrackingError, TrackingOptions, track_dataset, tracker_config};
+use mba_mapper::self_calibration::depth_lag;
+use mba_mapper::tracking::{
+    TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config,
+};
 use serde_json::json;
 
 use super::{calibrate, open, outcome};
 use crate::args::{Switch, Track, Tracking};
 use crate::console::Console;
-use crate::failure::{OrBadInput, interrupted};
-use crate::interrupt;
+use crate::failure::{OrBadInput, interrupted, is_disk_full};
+use crate::interrupt::{self, Resumption};
 use crate::report::table;
 use crate::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
+
+/// Contradiction between picture and depth in the median frame above which depth may be that of another frame. Noise alone
+/// gives less than 1, depth that is one frame off 7.
+const CONTRADICTION: f64 = 3.0;
+
+/// Advice when a checkpoint is not fit to go on from.
+const CHECKPOINT_HINT: &str = "start without --resume, or with the data set and options of the stopped run";
 
 /// Tracks a data set into a RUN folder and prints the summary.
 ///
@@ -22,30 +34,40 @@ use crate::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
 pub fn run(args: &Track, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let dataset = calibrate::completed(dataset, args.tracking.self_calibrate, console)?;
-    let summary = track_into(&dataset, &args.out, args.force, &args.tracking, console)?;
+    let (how, interval) = ((args.force, Resumption::Option(args.resume)), args.checkpoint_interval);
+    let summary = track_into(&dataset, &args.out, how, interval, &args.tracking, console)?;
     console.result(&summary, table::summary)
 }
 
-/// Tracks `dataset` into the RUN folder `out`; with `force` also into a folder of others.
+/// Tracks `dataset` into the RUN folder `out`: with `force` also into a folder of others, from the checkpoint there if it is
+/// to be resumed, and with another checkpoint after each interval.
 ///
 /// # Errors
 /// As [`run`].
 pub fn track_into(
     dataset: &Dataset,
     out: &Path,
-    force: bool,
+    (force, resumption): (bool, Resumption),
+    interval: Duration,
     args: &Tracking,
     console: &Console,
 ) -> anyhow::Result<Summary> {
-    interrupt::watch();
+    let _saving = interrupt::saving();
     let folder = claim(out, force, &[dataset.folder()])?;
+    let options = TrackingOptions::from(args);
+    let mut checkpoint = TrackingCheckpoint::new(out, dataset, &options, interval, resumption.resumes())
+        .or_bad_input(CHECKPOINT_HINT)?;
     let mut writer = RunWriter::create(folder, settings(dataset, args))?;
     for warning in dataset.warnings() {
         console.warning(warning.to_string());
-        writer.warn(warning.to_string());
+        // Those of a run that goes on have been noted.
+        if checkpoint.frames() == 0 {
+            writer.warn(warning.to_string());
+        }
     }
     let progress = console.progress(dataset.len(), "tracking");
-    let tracked = track_dataset(dataset, &TrackingOptions::from(args), &mut writer, |_| {
+    progress.set_position(checkpoint.frames() as u64);
+    let tracked = track_and_keep(dataset, &options, &mut writer, Some(&mut checkpoint), |_| {
         progress.inc(1);
         interrupt::flow()
     });
@@ -54,8 +76,18 @@ pub fn track_into(
         Err(TrackingError::Camera(error)) => {
             Err(error).or_bad_input(CAMERA_HINT)?;
         }
-        Err(TrackingError::Stopped) => return Err(stopped(dataset, out, writer.frames().len())),
-        other => other?,
+        Err(TrackingError::Stopped) => return Err(stopped(dataset, out, &writer, resumption)),
+        Err(TrackingError::Checkpoint(error)) if !is_disk_full(&error) => {
+            Err(error).or_bad_input(CHECKPOINT_HINT)?;
+        }
+        other => {
+            if other? > CONTRADICTION
+                && let Some(lag) = depth_lag(dataset)
+            {
+                console.warning(lag.to_string());
+                writer.warn(lag.to_string());
+            }
+        }
     }
     if outcome::nothing_tracked(writer.frames()) && writer.has_earlier() {
         writer.give_up();
@@ -63,8 +95,8 @@ pub fn track_into(
     }
     writer.replace_earlier()?;
     calibrate::keep(dataset, out)?;
-    if args.keyframes == Switch::On {
-        deblur_keyframes(dataset, args, &mut writer, console)?;
+    if args.keyframes == Switch::On && deblur_keyframes(dataset, args, &mut writer, console)?.is_break() {
+        return Err(stopped(dataset, out, &writer, resumption));
     }
     let merit = Merit::of(writer.exposures(), dataset);
     let summary = writer.finish(|summary| {
@@ -86,10 +118,13 @@ fn deblur_keyframes(
     args: &Tracking,
     writer: &mut RunWriter,
     console: &Console,
-) -> Result<(), RunError> {
+) -> Result<ControlFlow<()>, RunError> {
     let config = tracker_config(dataset, &TrackingOptions::from(args));
     let progress = console.progress(writer.keyframes().len(), "deblurring");
-    let written = write_deblurred_keyframes(dataset, &config, writer, || progress.inc(1));
+    let written = write_deblurred_keyframes(dataset, &config, writer, || {
+        progress.inc(1);
+        interrupt::flow()
+    });
     progress.finish_and_clear();
     written
 }
@@ -106,11 +141,12 @@ fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
     written_run::settings(dataset, &values)
 }
 
-fn stopped(dataset: &Dataset, out: &Path, frames: usize) -> anyhow::Error {
-    let message = format!(
-        "stopped after {frames} of {} frames; {} holds them, marked as incomplete",
-        dataset.len(),
-        out.display()
-    );
-    interrupted(message, format!("`{}` starts again", interrupt::command_to_go_on(false)))
+fn stopped(dataset: &Dataset, out: &Path, writer: &RunWriter, resumption: Resumption) -> anyhow::Error {
+    let (frames, all) = (writer.frames().len(), dataset.len());
+    let message = if writer.has_earlier() {
+        format!("stopped after {frames} of {all} frames; {} still holds the earlier run", out.display())
+    } else {
+        format!("stopped after {frames} of {all} frames; {} holds them, marked as incomplete", out.display())
+    };
+    interrupted(message, resumption.advice())
 }

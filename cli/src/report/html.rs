@@ -1,7 +1,7 @@
 //! `report.html`: one file without network access.
 
 use mba_mapper::evaluation::{BlurFigures, TrajectoryFigures};
-use mba_mapper::run::{MapFigures, Run, SlamFigures, Spread, Summary};
+use mba_mapper::run::{MapFigures, Run, SlamFigures, Spread, Summary, path_of};
 use mba_mapper::statistics::Statistics;
 use serde_json::Value;
 
@@ -59,7 +59,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
 </body>
 </html>
 "#,
-        folder = escape(&summary.settings.dataset),
+        folder = escape(&path_of(&summary.settings.dataset).display().to_string()),
         notices = notices(summary),
         tiles = tiles(summary),
         tables = tables.concat(),
@@ -68,7 +68,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
 }
 
 fn data_set_name(summary: &Summary) -> String {
-    let path = std::path::Path::new(&summary.settings.dataset);
+    let path = path_of(&summary.settings.dataset);
     path.file_name().map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 

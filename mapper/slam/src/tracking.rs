@@ -1,5 +1,7 @@
 //! Tracking a whole data set into a RUN folder.
 
+mod saved;
+
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -10,11 +12,14 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 use mba_tracker::trajectory::ExposureTrajectory;
 use mba_tracker::{
-    Doubt, Frame, FrameResult, GyroReading, Readout, ReferenceMode, SimdLevel, Tracker, TrackerConfig,
+    Doubt, Frame, FrameResult, GyroReading, Readout, ReferenceMode, Revision, SimdLevel, Tracker,
+    TrackerConfig,
 };
 
 use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
 use crate::uncertainty::Uncertainty;
+use mba_io::checkpoint::CheckpointError;
+pub use saved::TrackingCheckpoint;
 
 /// What can be chosen about the tracker; everything else follows from the data set.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +53,9 @@ pub enum TrackingError {
     /// The results cannot be written.
     #[error(transparent)]
     Run(#[from] RunError),
+    /// A checkpoint cannot be written, or gone on from.
+    #[error(transparent)]
+    Checkpoint(#[from] CheckpointError),
 }
 
 /// The tracker's configuration for a data set.
@@ -100,8 +108,24 @@ pub fn track_dataset(
     dataset: &Dataset,
     options: &TrackingOptions,
     run: &mut RunWriter,
-    mut observe: impl FnMut(&FrameRecord) -> ControlFlow<()>,
+    observe: impl FnMut(&FrameRecord) -> ControlFlow<()>,
 ) -> Result<(), TrackingError> {
+    track_and_keep(dataset, options, run, None, observe).map(|_| ())
+}
+
+/// As [`track_dataset`], with checkpoints: the run goes on from the one that was read, if there is one, and ends as if it
+/// had never been stopped. One is written from time to time, and when `observe` asks for an end.
+/// Returns how far picture and depth contradict each other in the median frame, see [`FrameResult::disagreement`].
+///
+/// # Errors
+/// As [`track_dataset`].
+pub fn track_and_keep(
+    dataset: &Dataset,
+    options: &TrackingOptions,
+    run: &mut RunWriter,
+    mut checkpoint: Option<&mut TrackingCheckpoint>,
+    mut observe: impl FnMut(&FrameRecord) -> ControlFlow<()>,
+) -> Result<f64, TrackingError> {
     let config = tracker_config(dataset, options);
     config.validate().map_err(TrackingError::Camera)?;
     // Without images the size of the camera is a mere claim, for which no memory is taken.
@@ -109,21 +133,21 @@ pub fn track_dataset(
     let mut memory = vec![0; if has_images { config.workspace_len() } else { 0 }];
     let tracker = has_images.then(|| Tracker::new(&config, SimdLevel::new(), &mut memory)).transpose();
     let mut tracker = tracker.map_err(TrackingError::Camera)?;
-    // The tracker counts the frames it was given, the run those of the data set.
-    let mut given = Vec::with_capacity(dataset.len());
     let mut uncertainty = Uncertainty::default();
-    for index in 0..dataset.len() {
+    let first = match (&mut checkpoint, &mut tracker) {
+        (Some(checkpoint), Some(tracker)) => checkpoint.restore(tracker, &mut uncertainty, run)?,
+        _ => 0,
+    };
+    // The tracker counts the frames it was given, the run those of the data set.
+    let was_given =
+        |(index, record): (usize, &FrameRecord)| (record.reason != Some(Reason::Skipped)).then_some(index);
+    let mut given: Vec<usize> = run.frames().iter().enumerate().filter_map(was_given).collect();
+    for index in first..dataset.len() {
         let record = match track_frame(tracker.as_mut(), dataset, index, given.last().copied()) {
             Ok((result, ms)) => {
                 given.push(index);
                 if let Some(revision) = &result.revision {
-                    let revised = given.get(revision.index).copied().unwrap_or(index);
-                    let exposure = timed(
-                        dataset.timestamp(revised),
-                        &revision.world_from_camera,
-                        &revision.world_from_mid,
-                    );
-                    run.revise(revised, exposure, f64::from(revision.blur));
+                    revise(dataset, run, given.get(revision.index).copied().unwrap_or(index), revision);
                 }
                 let record = FrameRecord { sigma_m: uncertainty.add(&result), ..record(&result, ms) };
                 run.push(timed_result(&result), record)?;
@@ -136,12 +160,26 @@ pub fn track_dataset(
                 record
             }
         };
-        if observe(&record).is_break() {
+        let is_stopped = observe(&record).is_break();
+        if is_stopped {
             run.flush()?;
+        }
+        if let (Some(checkpoint), Some(tracker)) = (&mut checkpoint, &mut tracker)
+            && (is_stopped || checkpoint.is_due(index + 1 == dataset.len()))
+        {
+            checkpoint.write(tracker, &uncertainty, run)?;
+        }
+        if is_stopped {
             return Err(TrackingError::Stopped);
         }
     }
-    Ok(())
+    Ok(uncertainty.disagreement())
+}
+
+/// Replaces what `run` has of frame `index`.
+fn revise(dataset: &Dataset, run: &mut RunWriter, index: usize, revision: &Revision) {
+    let Revision { world_from_camera, world_from_mid, blur, index: _ } = revision;
+    run.revise(index, timed(dataset.timestamp(index), world_from_camera, world_from_mid), f64::from(*blur));
 }
 
 /// Why one frame was skipped.

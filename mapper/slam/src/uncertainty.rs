@@ -2,34 +2,45 @@
 
 use mba_tracker::FrameResult;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// Adds up the uncertainty of each frame relative to its keyframe and that of the keyframe.
 ///
 /// A frame is as uncertain relative to its keyframe as the alignment says, times how far picture and depth contradict each
 /// other beyond their noise (the ratio of Birge, as in averages of measurements that do not agree). A keyframe that is turned
 /// wrongly displaces what is far from it.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(crate) struct Uncertainty {
     frames: Vec<Pose>,
+    /// How far picture and depth contradict each other in each frame.
+    disagreements: Vec<f64>,
 }
 
 /// Uncertainty of one frame relative to the first.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Pose {
     /// Variance of the position, all axes together, square metres.
     position: f64,
     /// Variance of the rotation, all axes together, square radians.
     rotation: f64,
     /// World, metres.
-    place: Vector3<f64>,
+    place: [f64; 3],
 }
 
 impl Uncertainty {
+    /// Median over the frames of how far picture and depth contradict each other: below 1 where only noise sets them apart.
+    pub(crate) fn disagreement(&self) -> f64 {
+        let mut sorted = self.disagreements.clone();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    }
+
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
     /// relative to the first frame. None where the frame was not aligned.
     pub(crate) fn add(&mut self, result: &FrameResult) -> Option<f64> {
+        self.disagreements.push(result.disagreement);
         let place = result.world_from_mid.translation;
-        let start = Pose { place, ..Pose::default() };
+        let start = Pose { place: place.into(), ..Pose::default() };
         let reference = self.frames.get(result.reference_index).copied().unwrap_or(start);
         let covariance = result.information.try_inverse();
         let own = covariance.map(|covariance| {
@@ -38,11 +49,11 @@ impl Uncertainty {
         });
         let [position, rotation] = own.unwrap_or_default();
         // A small turn moves a point at distance d by d times its share across the line to it: two of three axes.
-        let lever = (place - reference.place).norm_squared() * reference.rotation * 2.0 / 3.0;
+        let lever = (place - Vector3::from(reference.place)).norm_squared() * reference.rotation * 2.0 / 3.0;
         let pose = Pose {
             position: reference.position + lever + position,
             rotation: reference.rotation + rotation,
-            place,
+            place: place.into(),
         };
         self.frames.push(pose);
         let is_first = self.frames.len() == 1;

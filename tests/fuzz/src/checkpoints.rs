@@ -1,10 +1,11 @@
-//! Checkpoints of maps and of SLAM runs, forged with a checksum that is right: a resumed run may make a wrong map of
+//! Checkpoints of tracks, maps and SLAM runs, forged with a checksum that is right: a resumed run may make a wrong map of
 //! them, or refuse them, and nothing else.
 
 use std::cell::RefCell;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::time::Duration;
 
 use mba_mapper::bundle::BundleState;
 use mba_mapper::checkpoint::{Identity, load};
@@ -14,6 +15,7 @@ use mba_mapper::output::{OutputFolder, Permission};
 use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter};
 use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
+use mba_mapper::tracking::{TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep};
 use tempfile::TempDir;
 
 use super::numbers::Numbers;
@@ -93,6 +95,21 @@ impl Bench {
             .expect("a folder for a run")
     }
 
+    /// Tracks until there are `frames` frames, from the checkpoint if there is one.
+    fn track(&self, frames: usize) -> Result<(), TrackingError> {
+        let options = TrackingOptions::default();
+        let out = self.output();
+        let mut checkpoint =
+            TrackingCheckpoint::new(out.path(), &self.dataset, &options, Duration::ZERO, true)?;
+        let mut writer = RunWriter::create(out, describe())?;
+        let mut left = frames.saturating_sub(checkpoint.frames());
+        track_and_keep(&self.dataset, &options, &mut writer, Some(&mut checkpoint), |_| {
+            left = left.saturating_sub(1);
+            if left == 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        })?;
+        writer.finish(|_| ()).map(|_| ()).map_err(TrackingError::from)
+    }
+
     /// One step of a map, from the checkpoint if there is one.
     fn map(&self) -> Result<(), MapError> {
         let settings = MapSettings { max_gaussians: Some(100), ..MapSettings::default() };
@@ -102,7 +119,7 @@ impl Bench {
 
     /// SLAM until `is_enough`, from the checkpoint if there is one.
     fn slam(&self, is_enough: impl Fn(SlamProgress) -> bool) -> Result<(), SlamError> {
-        let checkpoint_interval = std::time::Duration::ZERO;
+        let checkpoint_interval = Duration::ZERO;
         let settings =
             SlamSettings { max_gaussians: Some(100), checkpoint_interval, ..SlamSettings::default() };
         let observe = |at| if is_enough(at) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -173,6 +190,22 @@ fn edit(file: &mut Vec<u8>, numbers: &mut Numbers<'_>) {
             _ => file[at] ^= 1 << (d % 8),
         }
     }
+}
+
+/// `mba track --resume`: the frames that are left, from a forged checkpoint.
+pub fn resume_track(data: &[u8]) {
+    thread_local!(static KEPT: RefCell<Option<Bench>> = const { RefCell::new(None) });
+    KEPT.with_borrow_mut(|kept| {
+        let bench = kept.get_or_insert_with(|| {
+            let mut bench = Bench::new([64, 48]);
+            let stopped = bench.track(3);
+            assert!(matches!(stopped, Err(TrackingError::Stopped)), "{stopped:?}");
+            bench.keep_checkpoint();
+            bench
+        });
+        bench.forge(data);
+        let _ = bench.track(usize::MAX);
+    });
 }
 
 /// `mba map --resume`: one step from a forged checkpoint.

@@ -16,7 +16,7 @@ mod session;
 
 pub use binaries::{field, gaussians, mesh};
 pub use c_interface::c_interface;
-pub use checkpoints::{checkpoint, resume_map, resume_slam};
+pub use checkpoints::{checkpoint, resume_map, resume_slam, resume_track};
 pub use data_sets::{calibration, exposure_times, ground_truth, inertial, lists, replica, response, scannet};
 pub use images::{image, image_of_any_size};
 pub use runs::{run, trajectories};
@@ -26,7 +26,7 @@ pub use session::session;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 20] = [
+pub const TARGETS: [Target; 21] = [
     ("c_interface", c_interface),
     ("calibration", calibration),
     ("checkpoint", checkpoint),
@@ -43,6 +43,7 @@ pub const TARGETS: [Target; 20] = [
     ("response", response),
     ("resume_map", resume_map),
     ("resume_slam", resume_slam),
+    ("resume_track", resume_track),
     ("run", run),
     ("scannet", scannet),
     ("session", session),

@@ -1,15 +1,17 @@
 //! Ctrl-C and requests to end: what is there is saved, and the command that goes on is told.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::io::{BufRead, BufReader, Read};
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use mba_mapper::run::Run;
-use mba_tests::blurred_sequence::{BlurredSequence, assert_same_map};
+use mba_tests::blurred_sequence::{BlurredSequence, assert_same_map, assert_same_track};
 use mba_tests::small_dataset::FRAMES;
 
 use super::{Workplace, mba};
@@ -100,13 +102,99 @@ fn track_and_slam_keep_the_frames_so_far() {
         signal(&process, name);
         let (ended, said) = end(process);
         assert_eq!(ended, Some(code), "{command}: {said}");
-        let goes_on = if command == "slam" { " --resume` goes on" } else { "` starts again" };
-        assert!(said.contains("marked as incomplete") && said.contains(goes_on), "{said}");
+        assert!(said.contains("marked as incomplete") && said.contains(" --resume` goes on"), "{said}");
         let stopped = Run::open(&run).unwrap();
         assert!(!stopped.summary.complete && stopped.exposures.len() >= 40);
         assert!(stopped.exposures.len() < ROUNDS * FRAMES, "{command} had ended");
         assert_eq!(stopped.exposures.len(), stopped.frames.len());
         assert!(!run.join(".mba-lock").exists());
+    }
+}
+
+#[test]
+fn a_track_that_was_interrupted_goes_on_and_ends_the_same() {
+    let place = long_data_set();
+    let [data, whole, parts] = ["data", "whole", "parts"].map(|name| place.path(name));
+    let arguments = |out: &Path| -> Vec<OsString> {
+        vec!["track".into(), data.clone().into(), "--resume".into(), "--out".into(), out.into()]
+    };
+    let ended = mba(arguments(&whole));
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let frames = || fs::read_to_string(parts.join("frames.csv")).map_or(0, |text| text.lines().count());
+    let mut before = 0;
+    for name in ["-TERM", "-INT"] {
+        let mut process = start(&arguments(&parts));
+        wait_until(&mut process, || frames() > before + 100);
+        signal(&process, name);
+        let (_, said) = end(process);
+        assert!(said.contains(" --resume --out ") && said.contains("` goes on"), "{said}");
+        assert!(frames() > before, "it began anew after {before} frames");
+        before = frames();
+        assert!(before < ROUNDS * FRAMES, "it had ended");
+    }
+    let ended = mba(arguments(&parts));
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert_same_track(&whole, &parts);
+    assert!(!parts.join("checkpoint").exists());
+}
+
+#[test]
+fn folders_whose_names_are_in_another_encoding_are_found_again() {
+    let place = long_data_set();
+    let [data, run] = [b"fr\xfch", b"run\xe9"].map(|name| place.path("").join(OsStr::from_bytes(name)));
+    fs::rename(place.path("data"), &data).unwrap();
+    let fixed = ["track".into(), data.into_os_string(), "--out".into(), run.clone().into_os_string()];
+    let mut process = start(&fixed);
+    wait_until(&mut process, || run.join("checkpoint").is_file());
+    signal(&process, "-INT");
+    let (_, said) = end(process);
+    // As a shell reads it back.
+    let command = said.split('`').nth(1).unwrap().strip_prefix("mba ").unwrap();
+    assert!(command.contains("fr\\xfch' --out $'") && command.ends_with(" --resume"), "{said}");
+    let ended = mba(fixed.iter().cloned().chain(["--resume".into()]));
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    let report = mba([OsStr::new("report"), run.as_os_str()]);
+    assert!(report.code == Some(0) && !report.stderr.contains("warning"), "{}", report.stderr);
+}
+
+#[test]
+fn a_checkpoint_of_other_options_is_refused_and_stays() {
+    let place = long_data_set();
+    let [data, run] = [place.path("data"), place.path("run")].map(PathBuf::into_os_string);
+    let fixed = ["track".into(), data, "--out".into(), run];
+    let mut process = start(&fixed);
+    let checkpoint = place.path("run/checkpoint");
+    wait_until(&mut process, || checkpoint.is_file());
+    signal(&process, "-INT");
+    assert_eq!(end(process).0, Some(130));
+    let other = mba(fixed.iter().cloned().chain(["--resume", "--blur", "off"].map(OsString::from)));
+    other.assert_error(2, &["checkpoint", "of a run with other settings"]);
+    fs::write(&checkpoint, "cut").unwrap();
+    mba(fixed.iter().cloned().chain(["--resume".into()])).assert_error(2, &["is not a checkpoint"]);
+    assert_eq!(fs::read(&checkpoint).unwrap(), b"cut");
+}
+
+#[test]
+fn the_search_for_the_camera_ends_at_once_and_leaves_nothing() {
+    let place = long_data_set();
+    place.edit("data/calibration.toml", "exposure_seconds = 0.001\n", "");
+    for (command, name, code) in [("track", "-INT", 130), ("slam", "-TERM", 143)] {
+        let [data, run] = [place.path("data"), place.path("run")].map(PathBuf::into_os_string);
+        let mut process = start(&[command.into(), data, "--out".into(), run.clone()]);
+        let mut said = BufReader::new(process.stderr.take().unwrap());
+        let mut line = String::new();
+        while !line.contains("looking for what is not on record") {
+            line.clear();
+            assert_ne!(said.read_line(&mut line).unwrap(), 0, "{command} never looks for anything");
+        }
+        signal(&process, name);
+        let mut rest = String::new();
+        said.read_to_string(&mut rest).unwrap();
+        assert_eq!(process.wait().unwrap().code(), Some(code), "{rest}");
+        let expected =
+            format!("error: stopped before there was anything to go on from\nhint: `mba {command} ");
+        assert!(rest.starts_with(&expected) && rest.ends_with("` starts again\n"), "{rest}");
+        assert!(!Path::new(&run).exists());
     }
 }
 

@@ -1,4 +1,4 @@
-//! Maps and SLAM runs that are killed again and again, and go on each time: nothing that was read changes, what is left
+//! Tracks, maps and SLAM runs that are killed again and again, and go on each time: nothing that was read changes, what is left
 //! is marked as incomplete, and the result is that of a run that nobody disturbed.
 //!
 //! `MBA_KILLS=N cargo test --release -p mba-tests --test cli kill` kills every command at least `N` times.
@@ -11,7 +11,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use mba_mapper::run::Run;
-use mba_tests::blurred_sequence::assert_same_map;
+use mba_tests::blurred_sequence::{assert_same_map, assert_same_track};
 use mba_tests::tree::{Item, tree};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -34,6 +34,8 @@ struct Campaign<'a> {
     folder: &'a Path,
     words: &'a [&'a str],
     inputs: BTreeMap<PathBuf, Item>,
+    /// Asserts that two results are the same.
+    same: fn(&Path, &Path),
     seconds: f64,
 }
 
@@ -72,7 +74,7 @@ impl Campaign<'_> {
         }
         let run = Run::open(&out).unwrap_or_else(|error| panic!("{:?} left a cut run: {error}", self.words));
         if run.summary.complete {
-            assert_same_map(&self.folder.join("whole"), &out);
+            (self.same)(&self.folder.join("whole"), &out);
         }
         run.summary.complete
     }
@@ -85,8 +87,8 @@ fn inputs(folder: &Path) -> BTreeMap<PathBuf, Item> {
 }
 
 /// Kills a command until there were enough kills and it has ended; returns how often it was killed and ended.
-fn campaign(folder: &Path, words: &[&str], kills: u32, seed: u64) -> [u32; 2] {
-    let mut campaign = Campaign { folder, words, inputs: inputs(folder), seconds: 0.0 };
+fn campaign(folder: &Path, words: &[&str], same: fn(&Path, &Path), kills: u32, seed: u64) -> [u32; 2] {
+    let mut campaign = Campaign { folder, words, inputs: inputs(folder), same, seconds: 0.0 };
     let started = Instant::now();
     assert!(campaign.command("whole").status().unwrap().success(), "{words:?}");
     campaign.seconds = started.elapsed().as_secs_f64();
@@ -121,7 +123,18 @@ fn killed_maps_and_slam_runs_end_like_those_that_were_not() {
     let map = [&["map", "data", "--trajectory", "run"][..], &few].concat();
     let slam = [&["slam", "data"][..], &few].concat();
     for (words, seed) in [(map, 1), (slam, 2)] {
-        let [killed, ended] = campaign(folder, &words, kills(KILLS), seed);
+        let [killed, ended] = campaign(folder, &words, assert_same_map, kills(KILLS), seed);
         assert!(killed >= kills(KILLS) && ended > 0);
     }
+}
+
+#[test]
+fn killed_tracks_end_like_those_that_were_not() {
+    let place = tempfile::tempdir().unwrap();
+    let folder = place.path();
+    let synth = ["synth", "--frames", "40", "--size", "320x240", "--blur", "4", "--readout", "0.02", "--out"];
+    let data = folder.join("data").into_os_string();
+    assert_eq!(mba(synth.map(Into::into).into_iter().chain([data])).code, Some(0));
+    let [killed, ended] = campaign(folder, &["track", "data"], assert_same_track, kills(2 * KILLS), 3);
+    assert!(killed >= kills(2 * KILLS) && ended > 0);
 }

@@ -107,10 +107,12 @@ fn what_the_command_reads_is_not_written() {
     mapped(&place, "run", &[]).assert_error(2, &["run", "the command reads it"]);
     let views = ["render", ":mapped", "--poses", ":run/trajectory.txt", "--force", "--out"];
     command(&place, &[&views[..], &[":mapped"]].concat()).assert_error(2, &["the command reads it"]);
-    // The map of a run is no mesh, and the trajectory neither.
-    for file in [":mapped/map.ply", ":run/trajectory.txt"] {
-        let mesh = command(&place, &["mesh", ":mapped", "--out", file]);
-        mesh.assert_error(2, &["cannot write", "did not write"]);
+    // The trajectory of another run is no mesh; its own map a mesh does not replace, whatever is allowed.
+    let mesh = command(&place, &["mesh", ":mapped", "--out", ":run/trajectory.txt"]);
+    mesh.assert_error(2, &["cannot write", "did not write"]);
+    for force in [&[][..], &["--force"]] {
+        let mesh = command(&place, &[&["mesh", ":mapped", "--out", ":mapped/map.ply"][..], force].concat());
+        mesh.assert_error(2, &["cannot write", "the command reads it"]);
     }
     let stl = command(&place, &["mesh", ":mapped", "--out", ":mesh.stl"]);
     stl.assert_error(2, &["mesh.stl", ".ply, .glb or .obj"]);

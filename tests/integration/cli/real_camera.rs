@@ -127,9 +127,31 @@ fn contradictions_are_named() {
     let list = place.path("milliseconds/associations.txt");
     let line = |k: i32| format!("{0} rgb/{k:06}.png {0} depth/{k:06}.png\n", 32 * k);
     fs::write(&list, (0..8).map(line).collect::<String>()).unwrap();
-    let info = info(&place, "milliseconds");
-    let expected = "frames are 32 s apart; timestamps are in seconds, these look like milliseconds";
-    assert!(warnings(&info).contains(&expected), "{info}");
+    let said = "frames are 32.000 s apart, which 30 frames per second are not; timestamps are in seconds, these look like";
+    let data = place.path("milliseconds");
+    let refused = || mba([OsStr::new("info"), data.as_os_str()]);
+    refused().assert_error(2, &["milliseconds: ", said, "like milliseconds"]);
+    assert!(
+        refused().stderr.contains("hint: divide all times of the data set by 1000, or give the frame_rate")
+    );
+    // Without a frame rate as well, and in other units.
+    place.edit("milliseconds/calibration.toml", "frame_rate = 30.0\n", "");
+    refused().assert_error(2, &["milliseconds: ", said, "like milliseconds"]);
+    for (unit, factor) in [("microseconds", 1_000), ("nanoseconds", 1_000_000)] {
+        let line = |k: i64| format!("{0} rgb/{k:06}.png {0} depth/{k:06}.png\n", 32 * k * factor);
+        fs::write(&list, (0..8).map(line).collect::<String>()).unwrap();
+        refused().assert_error(2, &["timestamps are in seconds, these look like", unit]);
+    }
+    // Every hundredth frame of a video is no other unit, nor is what the calibration says.
+    let every = |seconds: f64| {
+        let line = |k: i32| format!("{0} rgb/{k:06}.png {0} depth/{k:06}.png\n", seconds * f64::from(k));
+        fs::write(&list, (0..8).map(line).collect::<String>()).unwrap();
+    };
+    every(3.3);
+    assert_eq!(refused().code, Some(0));
+    every(32.0);
+    place.edit("milliseconds/calibration.toml", "width", "frame_rate = 0.03\nwidth");
+    assert_eq!(refused().code, Some(0));
 }
 
 #[test]
@@ -175,4 +197,65 @@ fn a_response_comes_from_a_file() {
     let refused = mba(arguments.into_iter().chain([out.as_os_str()]));
     refused.assert_error(2, &["curve.csv, line 3", "rows light,value"]);
     assert!(!out.exists());
+}
+
+#[test]
+fn depth_that_is_one_frame_late_is_noticed() {
+    let place = Workplace::new();
+    let shaken = ["--frames", "24", "--size", "320x240", "--blur", "4", "--seed", "3"];
+    let out = place.path("late");
+    let arguments = ["synth"].into_iter().chain(shaken).chain(["--out"]).map(OsStr::new);
+    assert_eq!(mba(arguments.chain([out.as_os_str()])).code, Some(0));
+    let about_depth = |info: &serde_json::Value| -> Vec<String> {
+        warnings(info)
+            .iter()
+            .filter(|warning| warning.starts_with("depth"))
+            .map(ToString::to_string)
+            .collect()
+    };
+    assert_eq!(about_depth(&info(&place, "late")), [""; 0]);
+    for k in (1..24).rev() {
+        let depth = |k: u32| out.join(format!("depth/{k:06}.png"));
+        fs::copy(depth(k - 1), depth(k)).unwrap();
+    }
+    let said = about_depth(&info(&place, "late"));
+    assert_eq!(said.len(), 1, "{said:?}");
+    assert!(said[0].starts_with("depth comes one frame late: in 16 of 16 sampled frames"), "{said:?}");
+    assert!(said[0].ends_with("depth_delay_seconds = -0.0333 into the calibration"), "{said:?}");
+    let track = |run: &str| {
+        let [data, run] = [place.path("late"), place.path(run)];
+        let tracked = mba([
+            OsStr::new("track"),
+            data.as_os_str(),
+            "--out".as_ref(),
+            run.as_os_str(),
+            "--json".as_ref(),
+        ]);
+        let ate = tracked.json()["trajectory"]["ate_m"]["rmse"].as_f64().unwrap();
+        (tracked.stderr, ate)
+    };
+    let (warned, wrong) = track("wrong");
+    assert!(warned.contains("warning: depth comes one frame late"), "{warned}");
+    place.edit("late/calibration.toml", "width", "depth_delay_seconds = -0.0333\nwidth");
+    let (silent, right) = track("right");
+    assert!(
+        !silent.contains("depth comes") && right < 0.4 * wrong,
+        "{silent}: {right} m with, {wrong} m without"
+    );
+}
+
+#[test]
+fn small_images_with_holes_in_their_depth_are_tracked_from_the_first_frame() {
+    let place = Workplace::new();
+    for (scene, seed) in [("room", "1"), ("hall", "5"), ("hall", "8")] {
+        let [data, run] = ["data", "run"].map(|name| place.path(&format!("{name}-{scene}-{seed}")));
+        let fixed = [
+            "synth", "--size", "160x120", "--blur", "2", "--frames", "12", "--scene", scene, "--seed", seed,
+            "--out",
+        ];
+        assert_eq!(mba(fixed.map(OsStr::new).into_iter().chain([data.as_os_str()])).code, Some(0));
+        let words = ["track", "--keyframes", "off", "--json", "--out"].map(OsStr::new);
+        let tracked = mba(words.into_iter().chain([run.as_os_str(), data.as_os_str()])).json();
+        assert_eq!(tracked["frames"]["ok"], 12, "{scene} {seed}: {tracked}");
+    }
 }

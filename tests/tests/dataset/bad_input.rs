@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use mba_mapper::dataset::{self, DatasetError, FrameError, Readout, Response};
+use image::ImageEncoder;
+use mba_mapper::dataset::{self, Dataset, DatasetError, FrameError, Readout, Response};
 
 use crate::folder::{Folder, HEIGHT, WIDTH, colour_image};
 
@@ -36,7 +37,9 @@ fn images_of_another_size_or_type_are_errors() {
     let message = folder.shortened(&folder.open().frame(1).unwrap_err());
     assert_eq!(message, "rgb/1.png has 9 x 6 pixels, the calibration says 8 x 6");
     larger.to_luma8().save(folder.path.join("depth/0.png")).unwrap();
-    assert_eq!(folder.message(), "depth/0.png has 9 x 6 pixels, the calibration says 8 x 6");
+    let expected = "depth/0.png has 9 x 6 pixels, the colour images 8 x 6; depth has to be registered to colour, pixel \
+                    by pixel";
+    assert_eq!(folder.message(), expected);
     colour_image(WIDTH, HEIGHT).to_luma8().save(folder.path.join("depth/0.png")).unwrap();
     let message = folder.shortened(&folder.open().frame(0).unwrap_err());
     assert_eq!(message, "depth/0.png has pixels of type L8, expected 16-bit grey (L16) for depth");
@@ -46,8 +49,8 @@ fn images_of_another_size_or_type_are_errors() {
 fn bad_lists_are_named_with_line_and_value() {
     let folder = Folder::complete();
     let line = |time: &str| format!("{time} rgb/0.png {time} depth/0.png\n");
-    folder.write("associations.txt", &[line("2"), line("1.5")].concat());
-    assert!(folder.message().starts_with("associations.txt, line 2: timestamp 1.5 comes after 2; sort"));
+    folder.write("associations.txt", &[line("2"), line("1.5"), line("2")].concat());
+    assert!(folder.message().starts_with("associations.txt, line 3: timestamp 2 occurs twice"));
     folder.write("associations.txt", &[line("2"), line("2.0")].concat());
     assert_eq!(
         folder.message(),
@@ -67,16 +70,62 @@ fn bad_lists_are_named_with_line_and_value() {
     fs::remove_file(folder.path.join("associations.txt")).unwrap();
     assert!(matches!(folder.open_error(), DatasetError::UnknownLayout { .. }));
     folder.write("rgb.txt", "1 rgb/0.png\n");
-    folder.write("depth.txt", "2 depth/0.png\n1 depth/1.png\n");
-    assert!(folder.message().starts_with("depth.txt, line 2: timestamp 1 comes after 2; sort"));
+    folder.write("depth.txt", "2 depth/0.png\n1 depth/1.png\n2 depth/2.png\n");
+    assert!(folder.message().starts_with("depth.txt, line 3: timestamp 2 occurs twice"));
     folder.write("depth.txt", "");
     assert_eq!(folder.message(), "depth.txt lists no images");
 }
 
 #[test]
+fn lists_in_another_order_are_read_in_that_of_time() {
+    let folder = Folder::complete();
+    let line = |time: f64, k: u32| format!("{time} rgb/{k}.png {time} depth/{k}.png\n");
+    folder.write("associations.txt", &[line(1.0, 0), line(1.2, 2), line(1.1, 1), line(1.3, 3)].concat());
+    let times = |dataset: &Dataset| (0..4).map(|k| dataset.timestamp(k)).collect::<Vec<_>>();
+    assert_eq!(times(&folder.open()), [1.0, 1.1, 1.2, 1.3]);
+    let expected =
+        "associations.txt: 1 lines are earlier than the one before; the list is read in the order of time";
+    assert!(folder.warnings().iter().any(|warning| warning.ends_with(expected)), "{:?}", folder.warnings());
+    fs::remove_file(folder.path.join("associations.txt")).unwrap();
+    folder.write("rgb.txt", "1.3 rgb/3.png\n1.2 rgb/2.png\n1.1 rgb/1.png\n1 rgb/0.png\n");
+    folder.write("depth.txt", "1 depth/0.png\n1.1 depth/1.png\n1.2 depth/2.png\n1.3 depth/3.png\n");
+    assert_eq!(times(&folder.open()), [1.0, 1.1, 1.2, 1.3]);
+}
+
+#[test]
+fn images_that_are_marked_as_turned_are_read_as_they_are_shown() {
+    let folder = Folder::complete();
+    let path = folder.path.join("rgb/0.png");
+    let upright = folder.open().frame(0).unwrap().rgb;
+    let turned = image::open(&path).unwrap().into_rgb8();
+    let write = |image: &image::RgbImage, orientation: u8| {
+        // A TIFF header and one entry: tag 0x0112, one short.
+        let exif =
+            [b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0".as_slice(), &[orientation, 0, 0, 0], &[0; 4]]
+                .concat();
+        let mut encoder = image::codecs::png::PngEncoder::new(fs::File::create(&path).unwrap());
+        encoder.set_exif_metadata(exif).unwrap();
+        image.write_with_encoder(encoder).unwrap();
+    };
+    // To be turned by half a circle.
+    write(&image::imageops::rotate180(&turned), 3);
+    assert_eq!(folder.open().frame(0).unwrap().rgb, upright);
+    let said = folder.warnings().concat();
+    assert!(said.contains("marked to be shown turned") && said.contains("read as it is shown"), "{said}");
+    // Stored upright with the size of the calibration, but marked as if it lay on its side.
+    write(&turned, 6);
+    assert_eq!(folder.open().frame(0).unwrap().rgb, upright);
+    assert!(folder.warnings().concat().contains("read as it is stored"));
+    // Stored on its side.
+    write(&image::imageops::rotate270(&turned), 6);
+    assert_eq!(folder.open().frame(0).unwrap().rgb, upright);
+}
+
+#[test]
 fn absurd_calibrations_are_named_with_line_and_value() {
     for (from, to, expected) in [
-        ("fx = 7.0", "fx = 0", "line 3: fx = 0, expected a focal length in pixels, above 0 and at most 100"),
+        ("fx = 7.0", "fx = 0", "line 3: fx = 0, expected a focal length in pixels, above 1 and at most 100"),
+        ("fx = 7.0", "fx = 1e300", "line 3: fx = 1e300, expected a focal length"),
         ("fy = 7.5", "fy = -7.5", "line 4: fy = -7.5, expected a focal length"),
         ("fx = 7.0", "fx = 801.0", "line 3: fx = 801, expected a focal length"),
         ("fx = 7.0", "fx = nan", "line 3: fx = NaN, expected a focal length"),
@@ -202,10 +251,11 @@ fn odd_timing_is_reported() {
     for (factor, unit) in [(1e3, "milliseconds"), (1e6, "microseconds"), (1e9, "nanoseconds")] {
         folder.write("associations.txt", &[0.0, 0.032, 0.064].map(|time| line(factor * time)).concat());
         let expected = format!(
-            "frames are {} s apart; timestamps are in seconds, these look like {unit}",
+            "FOLDER: frames are {:.3} s apart, which 30 frames per second are not; timestamps are in seconds, these look \
+             like {unit}",
             0.032 * factor
         );
-        assert!(folder.warnings().contains(&expected), "{:?}", folder.warnings());
+        assert_eq!(folder.message(), expected);
     }
 }
 

@@ -129,7 +129,7 @@ fn freiburg_sequences_need_no_calibration() {
         let folder = Folder::named(name);
         colour_image(640, 480).save(folder.path.join("rgb/0.png")).unwrap();
         ImageBuffer::from_pixel(640, 480, Luma([5000_u16])).save(folder.path.join("depth/0.png")).unwrap();
-        folder.write("associations.txt", "1.0 rgb/0.png 1.0 depth/0.png\n");
+        folder.write("associations.txt", "1305031102.0 rgb/0.png 1305031102.0 depth/0.png\n");
         let dataset = folder.open();
         let calibration = dataset.calibration();
         assert_eq!((calibration.camera.fx, calibration.distortion.k1), (fx, k1));
@@ -139,13 +139,18 @@ fn freiburg_sequences_need_no_calibration() {
         assert_eq!(folder.warnings().len(), 2);
         assert!(folder.warnings()[0].starts_with("no calibration.toml, using the published"));
         assert_eq!(dataset.frame(0).unwrap().depth[640 * 240 + 320], 5000);
+        // Folders of others may have such a name; those frames are not of 2011.
+        folder.write("associations.txt", "1625000000.0 rgb/0.png 1625000000.0 depth/0.png\n");
+        assert!(
+            folder.message().starts_with("FOLDER has no calibration.toml and is no recording of a known")
+        );
     }
     let folder = Folder::complete();
     fs::remove_file(folder.path.join("calibration.toml")).unwrap();
     assert_eq!(
         folder.message(),
-        "FOLDER has no calibration.toml and its name is not that of a known camera (freiburg1, freiburg2, \
-         freiburg3); add that file with the camera's width, height, fx, fy, cx, cy and depth_scale"
+        "FOLDER has no calibration.toml and is no recording of a known camera (freiburg1, freiburg2, freiburg3, \
+         recorded in 2011 and 2012); add that file with the camera's width, height, fx, fy, cx, cy and depth_scale"
     );
 }
 

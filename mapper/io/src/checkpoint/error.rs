@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use mba_tracker::SessionError;
+
 use super::Difference;
 use crate::{BinaryFileError, FileError};
 
@@ -36,6 +38,20 @@ pub enum CheckpointError {
         path: PathBuf,
         /// The first difference in the order of [`super::Identity`].
         difference: Difference,
+    },
+    /// What was recorded of the frames is not of this many frames.
+    #[error("{path} holds frames that the data set does not have")]
+    Rows {
+        /// The checkpoint.
+        path: PathBuf,
+    },
+    /// The tracker cannot go on from what is stored of it.
+    #[error("cannot go on from {path}: {reason}")]
+    Session {
+        /// The checkpoint.
+        path: PathBuf,
+        /// What the tracker says.
+        reason: SessionError,
     },
     /// The content is whole but not a value of the expected type.
     #[error("{path} does not hold what this program expects: {reason}")]

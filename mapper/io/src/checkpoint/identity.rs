@@ -4,6 +4,8 @@ use std::fmt;
 
 use serde::Serialize;
 
+use crate::dataset::Dataset;
+
 /// Length of a stored identity in bytes.
 pub(super) const IDENTITY_LEN: usize = 32;
 
@@ -17,6 +19,12 @@ impl Fingerprint {
     #[must_use]
     pub fn of(value: &(impl Serialize + ?Sized)) -> Self {
         Self::of_bytes(&postcard::to_stdvec(value).unwrap_or_default())
+    }
+
+    /// Of the frames and the calibration of a data set, wherever it lies.
+    pub fn of_dataset(dataset: &Dataset) -> Self {
+        let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
+        Self::of(&(format!("{:?}", dataset.calibration()), stamps))
     }
 
     /// Of bytes, e.g. the content of a file.

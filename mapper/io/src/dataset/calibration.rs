@@ -1,5 +1,7 @@
 //! What has to be known about the camera, and checks that it makes sense.
 
+use std::fmt::Display;
+
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use mba_tracker::photometric::{InverseResponse, Vignetting};
 use nalgebra::{Matrix3, Rotation3};
@@ -393,11 +395,11 @@ pub fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
     }
     let (width, height) = (camera.width as f64, camera.height as f64);
     for (key, focal) in [("fx", camera.fx), ("fy", camera.fy)] {
-        if !(focal > 0.0 && focal <= MAX_FOCAL_IN_WIDTHS * width) {
+        if !(focal > 1.0 && focal <= MAX_FOCAL_IN_WIDTHS * width) {
             return Err(invalid(
                 key,
                 focal,
-                "a focal length in pixels, above 0 and at most 100 image widths",
+                "a focal length in pixels, above 1 and at most 100 image widths",
             ));
         }
     }
@@ -414,6 +416,16 @@ pub fn check_positive(key: &'static str, value: f64, expected: &'static str) -> 
     if value.is_finite() && value > 0.0 { Ok(()) } else { Err(invalid(key, value, expected)) }
 }
 
-fn invalid(key: &'static str, value: impl ToString, expected: &'static str) -> InvalidValue {
-    InvalidValue { key, value: value.to_string(), expected }
+fn invalid(key: &'static str, value: impl Display, expected: &'static str) -> InvalidValue {
+    let mut value = value.to_string();
+    // Numbers of hundreds of digits are read best with an exponent.
+    if value.len() > LONGEST_VALUE
+        && let Ok(number) = value.parse::<f64>()
+    {
+        value = format!("{number:e}");
+    }
+    InvalidValue { key, value, expected }
 }
+
+/// Characters of a number that is shown digit by digit.
+const LONGEST_VALUE: usize = 24;

@@ -26,8 +26,8 @@ pub enum DatasetError {
     },
     /// There is neither a calibration file nor a known camera.
     #[error(
-        "{folder} has no calibration.toml and its name is not that of a known camera (freiburg1, freiburg2, \
-         freiburg3); add that file with the camera's width, height, fx, fy, cx, cy and depth_scale"
+        "{folder} has no calibration.toml and is no recording of a known camera (freiburg1, freiburg2, freiburg3, \
+         recorded in 2011 and 2012); add that file with the camera's width, height, fx, fy, cx, cy and depth_scale"
     )]
     MissingCalibration {
         /// The folder.
@@ -92,6 +92,36 @@ pub enum DatasetError {
         tolerance: f64,
         /// Smallest time difference found, seconds.
         closest: f64,
+    },
+    /// Frames are so far apart that their times must be in another unit.
+    #[error(
+        "{folder}: frames are {interval:.3} s apart, which {frame_rate} frames per second are not; timestamps are in \
+         seconds, these look like {unit}"
+    )]
+    TimestampUnit {
+        /// The data set.
+        folder: PathBuf,
+        /// Median time between frames, seconds as read.
+        interval: f64,
+        /// Frame rate of the calibration, per second.
+        frame_rate: f64,
+        /// The unit that would make it a video.
+        unit: &'static str,
+        /// How many of that unit are a second.
+        per_second: u64,
+    },
+    /// The first depth image does not have the size of the colour images, which is that of the calibration.
+    #[error(
+        "{path} has {} x {} pixels, the colour images {} x {}; depth has to be registered to colour, pixel by pixel",
+        .found.0, .found.1, .expected.0, .expected.1
+    )]
+    DepthSize {
+        /// The depth image.
+        path: PathBuf,
+        /// Its width and height.
+        found: (usize, usize),
+        /// Width and height of the colour images.
+        expected: (usize, usize),
     },
     /// The first image does not have the size of the calibration.
     #[error("{path} has {} x {} pixels, the calibration says {} x {}", .found.0, .found.1, .expected.0, .expected.1)]
@@ -264,13 +294,26 @@ pub enum Warning {
         /// One over the median time between frames, per second.
         measured: f64,
     },
-    /// Timestamps that are far apart and probably in another unit.
-    #[error("frames are {interval} s apart; timestamps are in seconds, these look like {unit}")]
-    TimestampUnit {
-        /// Median time between frames, seconds as read.
-        interval: f64,
-        /// The unit that would make it a video.
-        unit: &'static str,
+    /// Images are marked to be shown turned or mirrored.
+    #[error(
+        "{path} is marked to be shown turned or mirrored (EXIF orientation), and is read as it is {}, which the size in \
+         the calibration {}",
+        if *.as_shown { "shown" } else { "stored" },
+        if *.as_shown { "allows" } else { "asks for" }
+    )]
+    Orientation {
+        /// The first image.
+        path: PathBuf,
+        /// Whether it is read as it is shown; else as it is stored.
+        as_shown: bool,
+    },
+    /// A list is not in the order of time.
+    #[error("{list}: {count} lines are earlier than the one before; the list is read in the order of time")]
+    Unsorted {
+        /// The list.
+        list: PathBuf,
+        /// Number of such lines.
+        count: usize,
     },
     /// Frames are missing in between.
     #[error("{count} gaps between frames, the longest {longest:.3} s after {after}")]

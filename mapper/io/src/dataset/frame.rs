@@ -3,6 +3,7 @@
 use std::io::Cursor;
 use std::path::Path;
 
+use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::{FrameError, MAX_PIXELS};
@@ -57,15 +58,52 @@ pub(super) fn read_depth(path: &Path, size: (usize, usize)) -> Result<Vec<u16>, 
     Ok(decode(path, size, check)?.into_luma16().into_raw())
 }
 
-/// Width and height from the header of an image, if it has one.
-pub(super) fn image_size(path: &Path) -> Option<(usize, usize)> {
+/// What the header of an image says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ImageHeader {
+    /// Columns and rows as stored.
+    pub(super) stored: (usize, usize),
+    orientation: Orientation,
+}
+
+impl ImageHeader {
+    fn of(decoder: &mut impl ImageDecoder) -> Self {
+        let (width, height) = decoder.dimensions();
+        // What cannot be read is taken for not marked.
+        let orientation = decoder.orientation().unwrap_or(Orientation::NoTransforms);
+        Self { stored: (width as usize, height as usize), orientation }
+    }
+
+    /// Whether the image is to be shown otherwise than it is stored.
+    pub(super) fn is_turned(&self) -> bool {
+        self.orientation != Orientation::NoTransforms
+    }
+
+    /// Columns and rows as shown.
+    pub(super) fn shown(&self) -> (usize, usize) {
+        use Orientation::{Rotate90, Rotate90FlipH, Rotate270, Rotate270FlipH};
+        let (width, height) = self.stored;
+        match self.orientation {
+            Rotate90 | Rotate270 | Rotate90FlipH | Rotate270FlipH => (height, width),
+            _ => (width, height),
+        }
+    }
+
+    /// Whether the image can be read with that size: as it is shown, which is what programs that calibrate see, or else as
+    /// it is stored.
+    pub(super) fn has_size(&self, size: (usize, usize)) -> bool {
+        self.shown() == size || self.stored == size
+    }
+}
+
+/// The header of an image, if it has one.
+pub(super) fn header(path: &Path) -> Option<ImageHeader> {
     // A pipe or device may have no end.
     if !path.is_file() {
         return None;
     }
     let reader = ImageReader::open(path).ok()?.with_guessed_format().ok()?;
-    let (width, height) = reader.into_dimensions().ok()?;
-    Some((width as usize, height as usize))
+    Some(ImageHeader::of(&mut reader.into_decoder().ok()?))
 }
 
 /// Decodes an image of any pixel type and of up to 64 million pixels.
@@ -74,12 +112,13 @@ pub(super) fn image_size(path: &Path) -> Option<(usize, usize)> {
 ///
 /// [`FrameError`] if it is missing, damaged or too large.
 pub fn read_image(path: &Path) -> Result<DynamicImage, FrameError> {
-    decode_checked(path, |found, _| match found {
+    let image = decode_checked(path, |header, _| match header.stored {
         (width, height) if width.saturating_mul(height) > MAX_PIXELS => {
-            Err(FrameError::TooManyPixels { path: path.to_owned(), found, limit: MAX_PIXELS })
+            Err(FrameError::TooManyPixels { path: path.to_owned(), found: header.stored, limit: MAX_PIXELS })
         }
         _ => Ok(()),
-    })
+    });
+    image.map(|(image, _)| image)
 }
 
 /// Decodes an image after its size and `check` of its pixel type have been found good.
@@ -88,19 +127,24 @@ fn decode(
     size: (usize, usize),
     check: impl Fn(ColorType) -> Result<(), FrameError>,
 ) -> Result<DynamicImage, FrameError> {
-    decode_checked(path, |found, colour_type| {
-        if found != size {
+    let (mut image, header) = decode_checked(path, |header, colour_type| {
+        if !header.has_size(size) {
+            let found = header.stored;
             return Err(FrameError::SizeMismatch { path: path.to_owned(), found, expected: size });
         }
         check(colour_type)
-    })
+    })?;
+    if header.is_turned() && header.shown() == size {
+        image.apply_orientation(header.orientation);
+    }
+    Ok(image)
 }
 
 /// Decodes an image after `check` has found its size and pixel type good.
 fn decode_checked(
     path: &Path,
-    check: impl Fn((usize, usize), ColorType) -> Result<(), FrameError>,
-) -> Result<DynamicImage, FrameError> {
+    check: impl Fn(&ImageHeader, ColorType) -> Result<(), FrameError>,
+) -> Result<(DynamicImage, ImageHeader), FrameError> {
     let damaged = |reason: String| {
         // Some decoders break their messages into lines.
         let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -116,10 +160,11 @@ fn decode_checked(
     if reader.format() == Some(ImageFormat::Jpeg) && !jpeg_is_complete(&bytes) {
         return Err(damaged("the end marker of the JPEG stream is missing".into()));
     }
-    let decoder = reader.into_decoder().map_err(|error| damaged(error.to_string()))?;
-    let (width, height) = decoder.dimensions();
-    check((width as usize, height as usize), decoder.color_type())?;
-    DynamicImage::from_decoder(decoder).map_err(|error| damaged(error.to_string()))
+    let mut decoder = reader.into_decoder().map_err(|error| damaged(error.to_string()))?;
+    let header = ImageHeader::of(&mut decoder);
+    check(&header, decoder.color_type())?;
+    let image = DynamicImage::from_decoder(decoder).map_err(|error| damaged(error.to_string()))?;
+    Ok((image, header))
 }
 
 /// Whether an end-of-image marker follows the last scan: the decoder itself fills what is missing with grey.

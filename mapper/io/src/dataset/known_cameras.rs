@@ -1,5 +1,6 @@
 //! Calibrations of well-known sequences that come without a calibration file.
 
+use std::ops::Range;
 use std::path::Path;
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
@@ -18,9 +19,15 @@ pub(super) const TUM_DEPTH_SCALE: f64 = 5000.0;
 /// Frames per second of the TUM RGB-D benchmark.
 pub(super) const TUM_FRAME_RATE: f64 = 30.0;
 
+/// When the benchmark was recorded, seconds since 1970: 2011 and 2012.
+const RECORDED: Range<f64> = 1.29e9..1.36e9;
+
 /// Colour camera of a TUM RGB-D sequence (Sturm et al., IROS 2012), recognised by `freiburg1` (or `fr1`) and so
-/// on in the folder's name.
-pub(super) fn tum_camera(folder: &Path) -> Option<KnownCamera> {
+/// on in the folder's name, and by the time of its first frame, seconds since 1970: others name folders like that, too.
+pub(super) fn tum_camera(folder: &Path, first: f64) -> Option<KnownCamera> {
+    if !RECORDED.contains(&first) {
+        return None;
+    }
     let name = folder.file_name()?.to_string_lossy().to_lowercase();
     let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).collect();
     let named = |number: u32| {

@@ -8,7 +8,7 @@ use std::path::Path;
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 
 use super::calibration::{InvalidValue, check_camera};
-use super::frame::image_size;
+use super::frame::header;
 use super::numbered_images::{self, ImageFolder};
 use super::pose_matrix::pose_from_rows;
 use super::sequence::{Contents, FrameEntry};
@@ -61,7 +61,7 @@ fn read_camera<'a>(
     mut images: impl Iterator<Item = &'a Path>,
 ) -> Result<PinholeCamera, DatasetError> {
     let matrix = read_matrix(path)?;
-    let (width, height) = images.find_map(image_size).unwrap_or((0, 0));
+    let (width, height) = images.find_map(header).map_or((0, 0), |header| header.shown());
     let camera = PinholeCamera { width, height, fx: matrix[0], fy: matrix[5], cx: matrix[2], cy: matrix[6] };
     let located = |InvalidValue { key, value, expected }| DatasetError::CalibrationValue {
         path: path.to_owned(),

@@ -12,7 +12,7 @@ use mba_tracker::photometric::{Vignetting, radius_squared};
 use super::calibration::{
     ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, assumed_exposure_seconds, check_exposure,
 };
-use super::frame::{image_size, read_colour, read_depth};
+use super::frame::{ImageHeader, header, read_colour, read_depth};
 use super::vignetting::{falloff_of_frames, falloff_of_pixels};
 use super::{
     Calibration, CameraFact, DatasetError, ExposureSource, FrameError, InvalidValue, Knowledge, RgbdFrame,
@@ -80,11 +80,18 @@ impl Dataset {
     pub(super) fn new(folder: &Path, contents: Contents) -> Result<Self, DatasetError> {
         let Contents { calibration, colour_camera, entries, ground_truth, ground_truth_exposures, warnings } =
             contents;
+        check_unit(folder, &entries, calibration.frame_rate)?;
         let camera = calibration.camera;
         let captured = colour_camera.unwrap_or(camera);
         // Before the maps: their memory follows from sizes that may be wrong.
         let has_colour = check_first_size(entries.iter().map(|entry| &entry.colour), size(&captured))?;
-        let has_depth = check_first_size(entries.iter().map(|entry| &entry.depth), size(&camera))?;
+        let depths = entries.iter().map(|entry| &entry.depth);
+        let has_depth = check_first_size(depths, size(&camera)).map_err(|error| match error {
+            DatasetError::SizeMismatch { path, found, expected } if has_colour => {
+                DatasetError::DepthSize { path, found, expected }
+            }
+            other => other,
+        })?;
         let colour = ImageSource::new(&calibration, &captured, has_colour);
         let depth = ImageSource::new(&calibration, &camera, has_depth);
         let whole = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
@@ -341,6 +348,7 @@ impl Dataset {
         self.warnings = self.reader_warnings.iter().filter(still_holds).cloned().collect();
         self.warn_about_timing();
         self.warn_about_missing_images();
+        self.warn_about_orientation();
         self.read_imu();
     }
 
@@ -368,7 +376,6 @@ impl Dataset {
         {
             self.warnings.push(Warning::FrameRateDiffers { frame_rate, measured });
         }
-        self.warnings.extend(find_other_unit(&times));
         self.warnings.extend(find_gaps(&times));
         if let ExposureSource::Assumed { seconds } = self.calibration.exposure {
             let why = if seconds < assumed_exposure_seconds(frame_rate) {
@@ -384,6 +391,19 @@ impl Dataset {
         let exposure = self.entries.iter().map(|entry| self.entry_exposure(entry)).fold(0.0, f64::max);
         if exposure > interval * 1.001 {
             self.warnings.push(Warning::ExposureTooLong { exposure, interval });
+        }
+    }
+
+    /// One sentence for all images: a camera marks all of them alike, or as it was held.
+    fn warn_about_orientation(&mut self) {
+        let source = |entry: &FrameEntry| [entry.colour.clone(), entry.depth.clone()];
+        let first = self.entries.first().map(source).into_iter().flatten();
+        let sizes = [self.colour.size, self.depth.size];
+        for (path, size) in first.zip(sizes) {
+            if let Some(header) = header(&path).filter(ImageHeader::is_turned) {
+                let as_shown = header.shown() == size;
+                self.warnings.push(Warning::Orientation { path, as_shown });
+            }
         }
     }
 
@@ -446,17 +466,19 @@ fn median_interval(times: &[f64]) -> Option<f64> {
     intervals.get(intervals.len() / 2).copied()
 }
 
-/// A median interval that is no video's in seconds, but one in another unit.
-fn find_other_unit(times: &[f64]) -> Option<Warning> {
-    // Every hundredth frame of a video is still read without a word.
-    const LONGEST_INTERVAL: f64 = 5.0;
-    let interval = median_interval(times).filter(|interval| *interval > LONGEST_INTERVAL)?;
-    let unit = match interval {
-        ..1e3 => "milliseconds",
-        ..1e6 => "microseconds",
-        _ => "nanoseconds",
+/// Refuses times that are no video's in seconds, but one in another unit.
+fn check_unit(folder: &Path, entries: &[FrameEntry], frame_rate: f64) -> Result<(), DatasetError> {
+    // Every hundredth frame of a video is still read.
+    const MOST_INTERVALS: f64 = 150.0;
+    let times: Vec<f64> = entries.iter().map(|entry| entry.timestamp).collect();
+    let Some(interval) = median_interval(&times) else { return Ok(()) };
+    let (unit, per_second) = match interval * frame_rate {
+        ..=MOST_INTERVALS => return Ok(()),
+        ..3e4 => ("milliseconds", 1_000),
+        ..3e7 => ("microseconds", 1_000_000),
+        _ => ("nanoseconds", 1_000_000_000),
     };
-    Some(Warning::TimestampUnit { interval, unit })
+    Err(DatasetError::TimestampUnit { folder: folder.to_owned(), interval, frame_rate, unit, per_second })
 }
 
 /// Intervals of more than one and a half times the median.
@@ -477,9 +499,9 @@ fn check_first_size<'a>(
     mut paths: impl Iterator<Item = &'a PathBuf>,
     expected: (usize, usize),
 ) -> Result<bool, DatasetError> {
-    match paths.find_map(|path| image_size(path).map(|found| (path, found))) {
-        Some((path, found)) if found != expected => {
-            Err(DatasetError::SizeMismatch { path: path.clone(), found, expected })
+    match paths.find_map(|path| header(path).map(|found| (path, found))) {
+        Some((path, found)) if !found.has_size(expected) => {
+            Err(DatasetError::SizeMismatch { path: path.clone(), found: found.stored, expected })
         }
         first => Ok(first.is_some()),
     }

@@ -9,6 +9,10 @@ pub struct Survey {
     pub sampled: usize,
     /// What is wrong with those of them that cannot be read, one sentence each.
     pub unreadable: Vec<String>,
+    /// Readable frames whose colour image is black.
+    pub black: usize,
+    /// Readable frames whose colour image is of one brightness, black or not.
+    pub plain: usize,
     /// Readable frames without a single depth value.
     pub without_depth: usize,
     /// Share (0 to 1) of the pixels of the readable frames whose depth is missing; `None` without readable frames.
@@ -22,11 +26,14 @@ pub struct Survey {
 pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
     let sampled = max_frames.clamp(1, dataset.len().max(1));
     let mut unreadable = Vec::new();
-    let mut without_depth = 0;
+    let (mut black, mut plain, mut without_depth) = (0, 0, 0);
     let mut counts = DepthCounts::new();
     for k in 0..sampled {
         match dataset.frame(k * dataset.len() / sampled) {
             Ok(frame) => {
+                let [mean, deviation] = brightness(&frame.rgb);
+                black += usize::from(mean < BLACK);
+                plain += usize::from(deviation < PLAIN);
                 without_depth += usize::from(frame.depth_is_empty());
                 counts.add(&frame);
             }
@@ -36,10 +43,25 @@ pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
     Survey {
         sampled,
         unreadable,
+        black,
+        plain,
         without_depth,
         missing_depth: counts.missing_share(),
         median_depth: counts.median_raw().map(|raw| raw / dataset.calibration().depth_scale),
     }
+}
+
+/// Mean of the stored colour values below which an image is black, and standard deviation below which it shows nothing.
+const BLACK: f64 = 2.0;
+const PLAIN: f64 = 1.0;
+
+/// Mean and standard deviation of stored values.
+fn brightness(values: &[u8]) -> [f64; 2] {
+    let count = values.len().max(1) as f64;
+    let sum: u64 = values.iter().map(|value| u64::from(*value)).sum();
+    let squares: u64 = values.iter().map(|value| u64::from(*value).pow(2)).sum();
+    let mean = sum as f64 / count;
+    [mean, (squares as f64 / count - mean * mean).max(0.0).sqrt()]
 }
 
 /// How often each raw depth value occurs.

@@ -16,6 +16,10 @@ const ASSOCIATIONS: &str = "associations.txt";
 const COLOUR_LIST: &str = "rgb.txt";
 const DEPTH_LIST: &str = "depth.txt";
 
+/// Frames per second that are taken for a camera's where no frame rate is given. Slower times are in another unit, or those
+/// of a camera whose frame rate has to be given.
+const SLOWEST_ASSUMED: f64 = 0.2;
+
 /// One image of a list.
 struct ListedImage<'a> {
     timestamp: f64,
@@ -55,12 +59,12 @@ fn read_associations(
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<FrameEntry>, DatasetError> {
     let file = TextFile::read(path)?;
-    let mut entries: Vec<FrameEntry> = Vec::new();
+    let mut listed = Vec::new();
     for line in file.lines() {
         let (colour, depth) = parse_pair(&line)?;
-        line.check_order(colour.timestamp, entries.last().map(|entry| entry.timestamp))?;
-        entries.push(entry(folder, &colour, &depth));
+        listed.push((line, colour.timestamp, entry(folder, &colour, &depth)));
     }
+    let entries = in_order(listed, path, warnings)?;
     if entries.is_empty() {
         return Err(DatasetError::EmptyList { path: path.to_owned() });
     }
@@ -98,6 +102,23 @@ fn warn_about_pairs(path: &Path, entries: &[FrameEntry], options: &OpenOptions, 
     }
 }
 
+/// What is listed in the order of time, each with its line and time; a list in another order is worth a warning.
+fn in_order<T>(
+    mut listed: Vec<(Line<'_>, f64, T)>,
+    path: &Path,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<T>, FileError> {
+    let count = listed.windows(2).filter(|pair| pair[1].1 < pair[0].1).count();
+    if count > 0 {
+        listed.sort_by(|a, b| a.1.total_cmp(&b.1));
+        warnings.push(Warning::Unsorted { list: path.to_owned(), count });
+    }
+    for pair in listed.windows(2) {
+        pair[1].0.check_order(pair[1].1, Some(pair[0].1))?;
+    }
+    Ok(listed.into_iter().map(|(_, _, listed)| listed).collect())
+}
+
 /// Pairs the images of `rgb.txt` and `depth.txt` by time.
 fn associate_lists(
     folder: &Path,
@@ -107,8 +128,8 @@ fn associate_lists(
     let tolerance = options.association_tolerance;
     let (colour_list, depth_list) = (folder.join(COLOUR_LIST), folder.join(DEPTH_LIST));
     let (colour_file, depth_file) = (TextFile::read(&colour_list)?, TextFile::read(&depth_list)?);
-    let colour = parse_list(&colour_file, &colour_list)?;
-    let depth = parse_list(&depth_file, &depth_list)?;
+    let colour = parse_list(&colour_file, &colour_list, warnings)?;
+    let depth = parse_list(&depth_file, &depth_list, warnings)?;
     let times = |list: &[ListedImage<'_>]| list.iter().map(|image| image.timestamp).collect::<Vec<_>>();
     let (colour_times, depth_times) = (times(&colour), times(&depth));
 
@@ -130,16 +151,20 @@ fn associate_lists(
 }
 
 /// Parses `timestamp file` lines.
-fn parse_list<'a>(file: &'a TextFile, path: &Path) -> Result<Vec<ListedImage<'a>>, DatasetError> {
+fn parse_list<'a>(
+    file: &'a TextFile,
+    path: &Path,
+    warnings: &mut Vec<Warning>,
+) -> Result<Vec<ListedImage<'a>>, DatasetError> {
     const EXPECTED: &str = "timestamp image";
-    let mut images: Vec<ListedImage<'a>> = Vec::new();
+    let mut listed = Vec::new();
     for line in file.lines() {
         let fields: Vec<&str> = line.fields().collect();
         let &[time, file] = fields.as_slice() else { return Err(line.malformed(EXPECTED).into()) };
         let timestamp = line.number(time, EXPECTED)?;
-        line.check_order(timestamp, images.last().map(|image| image.timestamp))?;
-        images.push(ListedImage { timestamp, file });
+        listed.push((line, timestamp, ListedImage { timestamp, file }));
     }
+    let images = in_order(listed, path, warnings)?;
     if images.is_empty() { Err(DatasetError::EmptyList { path: path.to_owned() }) } else { Ok(images) }
 }
 
@@ -172,10 +197,11 @@ fn read_calibration(
     let path = folder.join(calibration_file::FILE_NAME);
     if path.is_file() {
         let times: Vec<f64> = entries.iter().map(|entry| entry.timestamp).collect();
-        return calibration_file::read(&path, frames_per_second(&times), warnings);
+        let measured = frames_per_second(&times).filter(|rate| *rate > SLOWEST_ASSUMED);
+        return calibration_file::read(&path, measured, warnings);
     }
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let known = tum_camera(&absolute)
+    let known = tum_camera(&absolute, entries.first().map_or(0.0, |entry| entry.timestamp))
         .ok_or_else(|| DatasetError::MissingCalibration { folder: folder.to_owned() })?;
     warnings.push(Warning::KnownCamera { camera: known.name });
     let calibration =

@@ -252,6 +252,5 @@ fn identity(dataset: &Dataset, run: &Run, settings: &MapSettings) -> Identity {
 
 /// What a data set is, wherever it lies: it may move between two parts of a run.
 pub(crate) fn dataset_fingerprint(dataset: &Dataset) -> Fingerprint {
-    let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
-    Fingerprint::of(&(format!("{:?}", dataset.calibration()), stamps))
+    Fingerprint::of_dataset(dataset)
 }

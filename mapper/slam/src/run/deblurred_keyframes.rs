@@ -1,12 +1,15 @@
 //! The keyframes of a run, all at once.
 
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use mba_adjust::deblurring::{DeblurError, DeblurMemory, KeyframeDeblurrer};
 use mba_io::dataset::Dataset;
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::{SimdLevel, TrackerConfig};
 use rayon::prelude::*;
 
-use super::{RunError, RunWriter};
+use super::{RunError, RunWriter, deblurred_path};
 
 /// Why a keyframe has no image.
 #[derive(Debug, thiserror::Error)]
@@ -19,7 +22,8 @@ enum Failure {
 
 /// Deblurs every keyframe that `run` has by now with the exposure that `run` has for it, and writes the images into
 /// the run's folder. Call it after the last frame: by then all exposures are final. `observe` is called after each
-/// keyframe, from any thread.
+/// keyframe, from any thread, and says whether to go on; the result says whether all were written. Images that lie in the
+/// folder are not made again: those of another run are removed before a run begins.
 ///
 /// A keyframe that cannot be read is left out, and `run` gets a warning that says why. The images do not depend on the
 /// number of threads.
@@ -30,17 +34,25 @@ pub fn write_deblurred_keyframes(
     dataset: &Dataset,
     config: &TrackerConfig,
     run: &mut RunWriter,
-    observe: impl Fn() + Sync,
-) -> Result<(), RunError> {
+    observe: impl Fn() -> ControlFlow<()> + Sync,
+) -> Result<ControlFlow<()>, RunError> {
     let keyframes = run.keyframes();
     // Threads would make their memory all the same.
     if keyframes.is_empty() {
-        return Ok(());
+        return Ok(ControlFlow::Continue(()));
     }
+    let is_stopped = AtomicBool::new(false);
     let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
     let write = |memory: &mut DeblurMemory, (index, exposure): (usize, TimedExposure)| {
-        let written = write_keyframe(dataset, &deblurrer, run, index, &exposure, memory);
-        observe();
+        let is_there = deblurred_path(run.folder(), index).is_file();
+        let written = if is_there || is_stopped.load(Ordering::Relaxed) {
+            Ok(())
+        } else {
+            write_keyframe(dataset, &deblurrer, run, index, &exposure, memory)
+        };
+        if observe().is_break() {
+            is_stopped.store(true, Ordering::Relaxed);
+        }
         (index, written)
     };
     let outcomes: Vec<_> = keyframes.into_par_iter().map_init(|| deblurrer.memory(), write).collect();
@@ -51,7 +63,7 @@ pub fn write_deblurred_keyframes(
             Err(Failure::Image(reason)) => run.warn(format!("keyframe {index} not deblurred: {reason}")),
         }
     }
-    Ok(())
+    Ok(if is_stopped.into_inner() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
 }
 
 fn write_keyframe(

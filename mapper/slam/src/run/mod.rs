@@ -21,6 +21,7 @@ mod keyframe_images;
 mod merit;
 mod reader;
 mod rows;
+mod stored_path;
 mod summary;
 mod writer;
 
@@ -31,6 +32,7 @@ pub use frame_record::{FrameRecord, FrameStatus, Reason};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
 pub(crate) use rows::RunRows;
+pub use stored_path::{path_of, stored_path};
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
 

@@ -21,6 +21,12 @@ impl RunRows {
     pub(crate) fn len(&self) -> usize {
         self.frames.len()
     }
+
+    /// Whether these can be rows of a data set of `frames` frames.
+    pub(crate) fn is_of(&self, frames: usize) -> bool {
+        let rows = self.len();
+        rows <= frames && self.exposures.len() == rows && self.skipped <= rows
+    }
 }
 
 impl RunWriter {
@@ -35,6 +41,15 @@ impl RunWriter {
             skipped: self.skipped,
             warnings: self.warnings.clone(),
         }
+    }
+
+    /// As [`Self::restore`], in the folder of that very run: images that lie there are its own and stay.
+    ///
+    /// # Errors
+    /// As [`Self::flush`].
+    pub(crate) fn go_on(&mut self, rows: RunRows) -> Result<(), RunError> {
+        self.is_started = true;
+        self.restore(rows)
     }
 
     /// Takes over what a run that was stopped had recorded, and brings the folder up to date.

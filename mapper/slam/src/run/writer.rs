@@ -33,7 +33,7 @@ const FRAMES_THAT_PROVE: usize = 2;
 pub struct RunWriter {
     folder: OutputFolder,
     /// Whether the files in the folder are those of this run.
-    is_started: bool,
+    pub(super) is_started: bool,
     settings: RunSettings,
     pub(super) exposures: Vec<TimedExposure>,
     pub(super) frames: Vec<FrameRecord>,

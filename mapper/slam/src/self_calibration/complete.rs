@@ -3,6 +3,7 @@
 use mba_io::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
 use mba_tracker::geometry::PinholeCamera;
 
+use super::depth_lag::depth_lag;
 use super::depth_time::{self, Measured};
 use super::exposure::PixelScale;
 use super::exposure_times::{ExposureSearch, ExposureTimes, Exposures, SHORTEST};
@@ -101,7 +102,13 @@ impl Estimates {
             return found;
         };
         let options = TrackingOptions::default();
-        let guess = Guess::of(dataset);
+        let mut guess = Guess::of(dataset);
+        if let Some(lag) = depth_lag(dataset) {
+            // Somewhere within half a frame of it, evenly: the edges tell more where they can.
+            let sigma = (lag.delay_seconds / 12.0_f64.sqrt()).abs();
+            found.depth_delay = Some(Measured { seconds: lag.delay_seconds, sigma });
+            guess.depth_delay = lag.delay_seconds;
+        }
         let recording = Recording { dataset, options: &options };
         let (window, mut probe) = recording.liveliest(guess);
         let seen = found.look_at_edges(&window, &probe);

@@ -199,7 +199,7 @@ impl EdgeFrame {
 }
 
 /// Places of jumps between the pixels of a row or of a column, and the raw depth of the near side.
-fn jumps(image: &RgbdFrame) -> Vec<([f64; 2], u16)> {
+pub(super) fn jumps(image: &RgbdFrame) -> Vec<([f64; 2], u16)> {
     let (width, height) = (image.width, image.height);
     let mut found = Vec::new();
     for v in 0..height {
@@ -224,7 +224,7 @@ fn jumps(image: &RgbdFrame) -> Vec<([f64; 2], u16)> {
 
 /// Magnitude of the gradient of the green channel, no more than [`STRONGEST`], smoothed by (1 2 1)/4 along both axes, in
 /// [`STRENGTH_STEPS`]. 0 on the border.
-fn gradient(image: &RgbdFrame) -> Vec<u8> {
+pub(super) fn gradient(image: &RgbdFrame) -> Vec<u8> {
     let (width, height) = (image.width, image.height);
     let green = |at: usize| f32::from(image.rgb[3 * at + 1]);
     let strength = |at: usize| {

@@ -13,6 +13,7 @@
 mod brightness;
 mod complete;
 mod depth_edges;
+mod depth_lag;
 mod depth_time;
 mod exposure;
 mod exposure_times;
@@ -30,6 +31,7 @@ mod vignetting;
 mod window;
 
 pub use complete::{complete, is_complete};
+pub use depth_lag::{DepthLag, depth_lag};
 pub use finding::{Finding, Value};
 pub use focal::focal_length;
 pub use metre::depth_scale;

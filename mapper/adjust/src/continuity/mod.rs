@@ -12,7 +12,7 @@
 //! its poses ([`compare_exposures`]), and stays where it was measured unless what it shows speaks for the other pose.
 //!
 //! [`repair`] corrects swaps, outliers and lost frames and leaves every other frame as it was measured, bit for bit.
-//! [`repair_run`](crate::mapping::repair_run) is the same for the data of a RUN folder. [`predict_motions`] gives bundle adjustment the motion during
+//! `repair_run` of the drivers is the same for the data of a RUN folder. [`predict_motions`] gives bundle adjustment the motion during
 //! an exposure that the neighbours of a frame suggest.
 
 mod direction;

@@ -21,7 +21,7 @@ pub(super) fn read(path: &Path) -> Result<InverseResponse, FileError> {
     }
 }
 
-/// The linear light of each code as text that [`read`] gets back bit for bit.
+/// The linear light of each code as text that `read` gets back bit for bit.
 pub fn to_text(response: &InverseResponse) -> String {
     let light = |code: u8| format!("{:?}\n", f64::from(response.linear_light(code)));
     (0..=u8::MAX).map(light).collect()

@@ -37,7 +37,7 @@ fn stages(c: &mut Criterion) {
     stage(c, "bin", true, |i| i.rasterizer.bin(&i.view, &mut i.scratch));
     stage(c, "composite", true, |i| i.rasterizer.composite(&mut i.scratch));
     stage(c, "store image", true, |i| i.rasterizer.store_image(&i.scratch, &mut i.image));
-    stage(c, "replay", true, |i| i.rasterizer.replay(&i.by_image, &mut i.scratch));
+    stage(c, "replay", true, |i| i.rasterizer.replay(&i.grad_image, &mut i.scratch));
     stage(c, "reduce and project backward", false, |i| {
         i.rasterizer.project_backward(&i.gaussians, &mut i.scratch, &mut i.gradients);
     });
@@ -95,7 +95,7 @@ fn pairs(c: &mut Criterion) {
                 with_threads(1, || b.iter(|| input.rasterizer.composite(&mut input.scratch)));
             });
             group.bench_function(id("backward"), |b| {
-                with_threads(1, || b.iter(|| input.rasterizer.replay(&input.by_image, &mut input.scratch)));
+                with_threads(1, || b.iter(|| input.rasterizer.replay(&input.grad_image, &mut input.scratch)));
             });
         }
     }

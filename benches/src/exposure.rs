@@ -47,7 +47,7 @@ impl ExposureInput {
 
     /// Takes the gradient back to map and path.
     pub fn backward(&mut self) -> SVector<f64, PATH_PARAMETERS> {
-        let RasterInput { gaussians, by_image, gradients, .. } = &mut self.room;
-        self.renderer.backward(gaussians, by_image, &mut self.scratch, gradients)
+        let RasterInput { gaussians, grad_image, gradients, .. } = &mut self.room;
+        self.renderer.backward(gaussians, grad_image, &mut self.scratch, gradients)
     }
 }

@@ -41,7 +41,7 @@ pub struct RasterInput {
     /// The rendered view.
     pub image: RasterImage,
     /// Gradient by its pixels.
-    pub by_image: RasterImage,
+    pub grad_image: RasterImage,
     /// Gradients by the map.
     pub gradients: GaussianGradients,
 }
@@ -75,8 +75,8 @@ impl RasterInput {
 
     fn new(level: Level, gaussians: Gaussians) -> Self {
         let view = view();
-        let mut by_image = RasterImage::zeros(view.camera.width, view.camera.height);
-        let planes = by_image.colour.iter_mut().chain([&mut by_image.depth, &mut by_image.alpha]);
+        let mut grad_image = RasterImage::zeros(view.camera.width, view.camera.height);
+        let planes = grad_image.colour.iter_mut().chain([&mut grad_image.depth, &mut grad_image.alpha]);
         for (plane, k) in planes.zip(1_u8..) {
             let wave = |pixel: usize| (pixel as f32 * 0.37 * f32::from(k)).sin();
             plane.iter_mut().enumerate().for_each(|(pixel, value)| *value = wave(pixel));
@@ -88,7 +88,7 @@ impl RasterInput {
             image: RasterImage::default(),
             gaussians,
             view,
-            by_image,
+            grad_image,
         };
         input.forward();
         input.backward();
@@ -102,8 +102,8 @@ impl RasterInput {
 
     /// Takes the gradient back to map and pose.
     pub fn backward(&mut self) {
-        let Self { rasterizer, gaussians, by_image, scratch, gradients, .. } = self;
-        rasterizer.backward(gaussians, by_image, scratch, gradients);
+        let Self { rasterizer, gaussians, grad_image, scratch, gradients, .. } = self;
+        rasterizer.backward(gaussians, grad_image, scratch, gradients);
     }
 }
 

@@ -94,11 +94,11 @@ pub struct GoldenRendering {
     /// The Gaussians.
     pub gaussians: Vec<ReferenceGaussian>,
     /// Gradient of the loss by the pixels.
-    pub by_pixels: ReferencePixelGradient,
+    pub grad_pixels: ReferencePixelGradient,
 }
 
 /// A gradient by colour only.
-fn by_colour(colour: Vec<Vector3<f64>>) -> ReferencePixelGradient {
+fn grad_colour(colour: Vec<Vector3<f64>>) -> ReferencePixelGradient {
     let zeros = vec![0.0; colour.len()];
     ReferencePixelGradient { depth: zeros.clone(), alpha: zeros, colour }
 }
@@ -160,11 +160,11 @@ impl GoldenScene {
         };
         let depths = gaussians.iter().map(with_depth).collect();
         [
-            GoldenRendering { view, gaussians, by_pixels: by_colour(of_colour) },
+            GoldenRendering { view, gaussians, grad_pixels: grad_colour(of_colour) },
             GoldenRendering {
                 view: RasterView { background: [0.0; 3], ..view },
                 gaussians: depths,
-                by_pixels: by_colour(of_depth),
+                grad_pixels: grad_colour(of_depth),
             },
         ]
     }
@@ -179,19 +179,19 @@ impl GoldenScene {
         view.translation += depth.view.translation;
         let mut gaussians = Vec::new();
         for ((one, other), gaussian) in colour.gaussians.iter().zip(&depth.gaussians).zip(self.gaussians()) {
-            let by_z = other.colour.x;
-            let of_centre = by_z * gaussian.mean.transpose();
+            let grad_z = other.colour.x;
+            let of_centre = grad_z * gaussian.mean.transpose();
             view.rotation.set_row(2, &(view.rotation.row(2) + of_centre));
-            view.translation.z += by_z;
+            view.translation.z += grad_z;
             let mut sum = ReferenceGradient {
-                mean: one.mean + other.mean + by_z * rotation.row(2).transpose(),
+                mean: one.mean + other.mean + grad_z * rotation.row(2).transpose(),
                 scale: one.scale + other.scale,
                 rotation: core::array::from_fn(|k| one.rotation[k] + other.rotation[k]),
                 opacity: one.opacity + other.opacity,
                 ..*one
             };
             sum.splat.centre += other.splat.centre;
-            sum.splat.depth += by_z;
+            sum.splat.depth += grad_z;
             (0..3).for_each(|k| sum.splat.conic[k] += other.splat.conic[k]);
             gaussians.push(sum);
         }

@@ -26,13 +26,13 @@ pub struct Rendered {
 impl Rendered {
     /// Renders a view and takes the gradient by its pixels back.
     #[must_use]
-    pub fn new(level: Level, gaussians: &Gaussians, view: &RasterView, by_image: &RasterImage) -> Self {
+    pub fn new(level: Level, gaussians: &Gaussians, view: &RasterView, grad_image: &RasterImage) -> Self {
         let rasterizer = Rasterizer::new(level);
         let mut scratch = RasterScratch::default();
         let mut image = RasterImage::default();
         let mut gradients = GaussianGradients::zeros(gaussians.len());
         rasterizer.forward(gaussians, view, &mut scratch, &mut image);
-        let view = rasterizer.backward(gaussians, by_image, &mut scratch, &mut gradients);
+        let view = rasterizer.backward(gaussians, grad_image, &mut scratch, &mut gradients);
         let contributions = rasterizer.contributions(&mut scratch);
         Self { image, gradients, view, contributions }
     }
@@ -52,14 +52,14 @@ pub fn to_parameters(gaussian: &ReferenceGaussian) -> Gaussian {
 
 /// The gradient by the pixels as the fast path takes it.
 #[must_use]
-pub fn to_image(view: &RasterView, by_pixels: &ReferencePixelGradient) -> RasterImage {
+pub fn to_image(view: &RasterView, grad_pixels: &ReferencePixelGradient) -> RasterImage {
     let plane = |values: &[f64]| values.iter().map(|&value| value as f32).collect();
     RasterImage {
         width: view.camera.width,
         height: view.camera.height,
-        colour: [0, 1, 2].map(|k| by_pixels.colour.iter().map(|colour| colour[k] as f32).collect()),
-        depth: plane(&by_pixels.depth),
-        alpha: plane(&by_pixels.alpha),
+        colour: [0, 1, 2].map(|k| grad_pixels.colour.iter().map(|colour| colour[k] as f32).collect()),
+        depth: plane(&grad_pixels.depth),
+        alpha: plane(&grad_pixels.alpha),
     }
 }
 

@@ -17,7 +17,7 @@ const TOLERANCE: f64 = 1e-6;
 struct Scene {
     view: RasterView,
     gaussians: Vec<ReferenceGaussian>,
-    by_pixels: ReferencePixelGradient,
+    grad_pixels: ReferencePixelGradient,
 }
 
 impl Scene {
@@ -25,18 +25,18 @@ impl Scene {
         let mut uniform = Uniform::new(seed);
         let view = random_view(&mut uniform, 24, 18);
         let gaussians = random_gaussians(&mut uniform, &view, 12);
-        Self { view, gaussians, by_pixels: random_pixel_gradient(&mut uniform, &view) }
+        Self { view, gaussians, grad_pixels: random_pixel_gradient(&mut uniform, &view) }
     }
 
     fn gradients(&self) -> ReferenceGradients {
-        gradients(&self.gaussians, &self.view, &self.by_pixels, Cutoff::Smooth)
+        gradients(&self.gaussians, &self.view, &self.grad_pixels, Cutoff::Smooth)
     }
 
     fn loss(&self) -> f64 {
         let image = render(&self.gaussians, &self.view, Cutoff::Smooth);
-        let colour: f64 = image.colour.iter().zip(&self.by_pixels.colour).map(|(a, b)| a.dot(b)).sum();
-        let depth: f64 = image.depth.iter().zip(&self.by_pixels.depth).map(|(a, b)| a * b).sum();
-        let alpha: f64 = image.alpha.iter().zip(&self.by_pixels.alpha).map(|(a, b)| a * b).sum();
+        let colour: f64 = image.colour.iter().zip(&self.grad_pixels.colour).map(|(a, b)| a.dot(b)).sum();
+        let depth: f64 = image.depth.iter().zip(&self.grad_pixels.depth).map(|(a, b)| a * b).sum();
+        let alpha: f64 = image.alpha.iter().zip(&self.grad_pixels.alpha).map(|(a, b)| a * b).sum();
         colour + depth + alpha
     }
 

@@ -25,7 +25,7 @@ struct Scene {
     path: ExposurePath,
     truth: Vec<ReferenceGaussian>,
     gaussians: Gaussians,
-    by_pixels: ReferencePixelGradient,
+    grad_pixels: ReferencePixelGradient,
 }
 
 /// What the fast path makes of an exposure.
@@ -33,7 +33,7 @@ struct Scene {
 struct Exposed {
     image: RasterImage,
     gradients: GaussianGradients,
-    by_path: SVector<f64, PATH_PARAMETERS>,
+    grad_path: SVector<f64, PATH_PARAMETERS>,
     drawn: Vec<bool>,
 }
 
@@ -44,11 +44,11 @@ impl Scene {
         let view = random_view(&mut uniform, size[0], size[1]);
         let truth = random_gaussians(&mut uniform, &view, count);
         let gaussians: Gaussians = truth.iter().map(to_parameters).collect();
-        let by_pixels = random_pixel_gradient(&mut uniform, &view);
+        let grad_pixels = random_pixel_gradient(&mut uniform, &view);
         let motion = Vector6::from_fn(|_, _| uniform.within(-0.1, 0.1));
         let ends = ExposureTrajectory::from_mid_and_motion(&view.world_from_camera, &motion);
         let path = ExposurePath { ends, bow: motion * 0.1 };
-        Self { view, path, truth, gaussians, by_pixels }
+        Self { view, path, truth, gaussians, grad_pixels }
     }
 
     fn exposed(&self, views: usize) -> Exposed {
@@ -57,9 +57,9 @@ impl Scene {
         let RasterView { camera, background, .. } = &self.view;
         renderer.forward(&self.gaussians, camera, &self.path, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(self.gaussians.len());
-        let by_image = to_image(&self.view, &self.by_pixels);
-        let by_path = renderer.backward(&self.gaussians, &by_image, &mut scratch, &mut gradients);
-        Exposed { image, gradients, by_path, drawn: scratch.drawn_mask().to_vec() }
+        let grad_image = to_image(&self.view, &self.grad_pixels);
+        let grad_path = renderer.backward(&self.gaussians, &grad_image, &mut scratch, &mut gradients);
+        Exposed { image, gradients, grad_path, drawn: scratch.drawn_mask().to_vec() }
     }
 
     /// The views of the oracle, at the middles of equal parts of the exposure, and the gradient by each.
@@ -70,13 +70,13 @@ impl Scene {
         (0..views).map(move |k| {
             let time = (2 * k + 1) as f64 / (2 * views) as f64;
             let view = RasterView { world_from_camera: self.path.at(time), ..self.view };
-            let mut by_pixels = self.by_pixels.clone();
-            by_pixels.colour.iter_mut().for_each(|colour| *colour /= views as f64);
+            let mut grad_pixels = self.grad_pixels.clone();
+            grad_pixels.colour.iter_mut().for_each(|colour| *colour /= views as f64);
             if 2 * k + 1 != views {
-                by_pixels.depth.fill(0.0);
-                by_pixels.alpha.fill(0.0);
+                grad_pixels.depth.fill(0.0);
+                grad_pixels.alpha.fill(0.0);
             }
-            (time, view, by_pixels)
+            (time, view, grad_pixels)
         })
     }
 
@@ -130,11 +130,11 @@ fn gradients_are_the_sums_over_the_oracles_views() {
     let mut colour = vec![Vector3::zeros(); 60];
     let mut mean = vec![Vector3::zeros(); 60];
     let (mut opacity, mut screen) = (vec![0.0; 60], vec![0.0; 60]);
-    let mut by_path = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
-    for (time, view, by_pixels) in scene.virtual_views(views) {
-        let ReferenceGradients { gaussians, view: by_view } =
-            gradients(&scene.truth, &view, &by_pixels, Cutoff::Hard);
-        by_path += pose_by_path(&scene.path, time).transpose() * by_view.tangent(&view.world_from_camera);
+    let mut grad_path = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
+    for (time, view, grad_pixels) in scene.virtual_views(views) {
+        let ReferenceGradients { gaussians, view: grad_view } =
+            gradients(&scene.truth, &view, &grad_pixels, Cutoff::Hard);
+        grad_path += pose_by_path(&scene.path, time).transpose() * grad_view.tangent(&view.world_from_camera);
         for (k, gradient) in gaussians.iter().enumerate() {
             colour[k] += gradient.colour;
             mean[k] += gradient.mean;
@@ -157,9 +157,9 @@ fn gradients_are_the_sums_over_the_oracles_views() {
         let largest = want.iter().fold(0.0, |largest: f64, x| largest.max(x.abs()));
         assert_near(name, got, want, GRADIENT_TOLERANCE * largest);
     }
-    let ends = got.by_path.iter();
-    for (k, (got, want)) in ends.zip(&by_path).enumerate() {
-        assert!((got - want).abs() <= GRADIENT_TOLERANCE * by_path.amax(), "end {k}: {got}, not {want}");
+    let ends = got.grad_path.iter();
+    for (k, (got, want)) in ends.zip(&grad_path).enumerate() {
+        assert!((got - want).abs() <= GRADIENT_TOLERANCE * grad_path.amax(), "end {k}: {got}, not {want}");
     }
 }
 
@@ -170,18 +170,18 @@ fn smooth_loss(scene: &mut Scene) {
     let wave = |pixel: usize, k: usize| {
         ((pixel % width) as f64 * 0.02 + (pixel / width) as f64 * 0.03 + k as f64).sin()
     };
-    let pixels = scene.by_pixels.depth.len();
-    scene.by_pixels.colour = (0..pixels).map(|pixel| Vector3::from_fn(|k, _| wave(pixel, k))).collect();
-    scene.by_pixels.depth = (0..pixels).map(|pixel| wave(pixel, 3)).collect();
-    scene.by_pixels.alpha = (0..pixels).map(|pixel| wave(pixel, 4)).collect();
+    let pixels = scene.grad_pixels.depth.len();
+    scene.grad_pixels.colour = (0..pixels).map(|pixel| Vector3::from_fn(|k, _| wave(pixel, k))).collect();
+    scene.grad_pixels.depth = (0..pixels).map(|pixel| wave(pixel, 3)).collect();
+    scene.grad_pixels.alpha = (0..pixels).map(|pixel| wave(pixel, 4)).collect();
 }
 
 fn loss(scene: &Scene, views: usize) -> f64 {
-    let (image, by_image) = (scene.exposed(views).image, to_image(&scene.view, &scene.by_pixels));
+    let (image, grad_image) = (scene.exposed(views).image, to_image(&scene.view, &scene.grad_pixels));
     let products =
         |a: &[f32], b: &[f32]| -> f64 { a.iter().zip(b).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum() };
-    let colour: f64 = image.colour.iter().zip(&by_image.colour).map(|(a, b)| products(a, b)).sum();
-    colour + products(&image.depth, &by_image.depth) + products(&image.alpha, &by_image.alpha)
+    let colour: f64 = image.colour.iter().zip(&grad_image.colour).map(|(a, b)| products(a, b)).sum();
+    colour + products(&image.depth, &grad_image.depth) + products(&image.alpha, &grad_image.alpha)
 }
 
 /// Checks slopes against gradients; what crosses the rims moves a slope by up to 2.5 % of the largest.
@@ -201,7 +201,7 @@ fn gradients_are_the_slopes_of_the_loss() {
     smooth_loss(&mut scene);
     let got = scene.exposed(3);
     let path = scene.path;
-    let ends: Vec<f64> = got.by_path.iter().copied().collect();
+    let ends: Vec<f64> = got.grad_path.iter().copied().collect();
     check_slopes("end", &ends, |k, step| {
         scene.path = path.perturbed(&SMatrix::from_fn(|i, _| if i == k { step } else { 0.0 }));
         loss(&scene, 3)
@@ -224,13 +224,13 @@ fn one_view_is_plain_rendering_at_mid_exposure() {
     let mut scene = Scene::new(4, [60, 40], 50);
     scene.path = ExposurePath::linear(scene.path.ends);
     let view = RasterView { world_from_camera: scene.path.mid(), ..scene.view };
-    let by_image = to_image(&scene.view, &scene.by_pixels);
-    let plain = Rendered::new(Level::new(), &scene.gaussians, &view, &by_image);
+    let grad_image = to_image(&scene.view, &scene.grad_pixels);
+    let plain = Rendered::new(Level::new(), &scene.gaussians, &view, &grad_image);
     let exposed = scene.exposed(1);
     assert!(exposed.image == plain.image && exposed.gradients == plain.gradients);
-    let by_pose = plain.view.tangent(&view.world_from_camera);
-    let whole = exposed.by_path.fixed_rows::<6>(0) + exposed.by_path.fixed_rows::<6>(6);
-    assert!((whole - by_pose).amax() <= 1e-9 * by_pose.amax(), "{whole} instead of {by_pose}");
+    let grad_pose = plain.view.tangent(&view.world_from_camera);
+    let whole = exposed.grad_path.fixed_rows::<6>(0) + exposed.grad_path.fixed_rows::<6>(6);
+    assert!((whole - grad_pose).amax() <= 1e-9 * grad_pose.amax(), "{whole} instead of {grad_pose}");
 }
 
 #[test]
@@ -256,10 +256,13 @@ fn used_memory_does_not_matter() {
         let RasterView { camera, background, .. } = &scene.view;
         renderer.forward(&scene.gaussians, camera, &scene.path, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(count);
-        let by_image = to_image(&scene.view, &scene.by_pixels);
-        let by_path = renderer.backward(&scene.gaussians, &by_image, &mut scratch, &mut gradients);
+        let grad_image = to_image(&scene.view, &scene.grad_pixels);
+        let grad_path = renderer.backward(&scene.gaussians, &grad_image, &mut scratch, &mut gradients);
         let fresh = scene.exposed(views);
-        assert!(image == fresh.image && gradients == fresh.gradients && by_path == fresh.by_path, "{seed}");
+        assert!(
+            image == fresh.image && gradients == fresh.gradients && grad_path == fresh.grad_path,
+            "{seed}"
+        );
         assert!(scratch.drawn_mask() == fresh.drawn, "scene {seed}");
     }
 }
@@ -286,8 +289,8 @@ fn images_of_another_size_give_no_gradient() {
     let RasterView { camera, background, .. } = &scene.view;
     renderer.forward(&scene.gaussians, camera, &scene.path, 3, *background, &mut scratch, &mut image);
     let mut gradients = GaussianGradients::zeros(20);
-    let by_path =
+    let grad_path =
         renderer.backward(&scene.gaussians, &RasterImage::zeros(40, 60), &mut scratch, &mut gradients);
     assert_eq!(gradients, GaussianGradients::zeros(20));
-    assert_eq!(by_path.norm(), 0.0);
+    assert_eq!(grad_path.norm(), 0.0);
 }

@@ -19,7 +19,7 @@ fn for_every_level_and_scene(check: impl Fn(&GoldenScene, &[Rendered; 2])) {
             println!("{}", level_name(level));
             let rendered = scene.renderings().map(|part| {
                 let gaussians: Gaussians = part.gaussians.iter().map(to_parameters).collect();
-                Rendered::new(level, &gaussians, &part.view, &to_image(&part.view, &part.by_pixels))
+                Rendered::new(level, &gaussians, &part.view, &to_image(&part.view, &part.grad_pixels))
             });
             check(&scene, &rendered);
         }

@@ -76,12 +76,12 @@ fn every_level_agrees_with_the_oracle() {
             random_gaussians(&mut uniform, &view, count).iter().map(to_parameters).collect();
         let gaussians: Vec<ReferenceGaussian> =
             (0..count).filter_map(|i| stored.get(i)).map(|g| ReferenceGaussian::from(&g)).collect();
-        let by_pixels = random_pixel_gradient(&mut uniform, &view);
+        let grad_pixels = random_pixel_gradient(&mut uniform, &view);
         let image = render(&gaussians, &view, Cutoff::Hard);
-        let want = gradients(&gaussians, &view, &by_pixels, Cutoff::Hard);
+        let want = gradients(&gaussians, &view, &grad_pixels, Cutoff::Hard);
         for level in levels_up_to(Level::new()) {
             println!("{width}x{height}, {}", level_name(level));
-            let got = Rendered::new(level, &stored, &view, &to_image(&view, &by_pixels));
+            let got = Rendered::new(level, &stored, &view, &to_image(&view, &grad_pixels));
             assert_images_agree(&got, &image);
             assert_gradients_agree(&got, &want, &gaussians);
         }

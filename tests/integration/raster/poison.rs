@@ -18,7 +18,7 @@ const EXTREME: [f32; 8] = [f32::MAX, f32::MIN, 1e30, -1e30, 1e15, -1e15, f32::MI
 struct Scene {
     view: RasterView,
     sane: Gaussians,
-    by_image: RasterImage,
+    grad_image: RasterImage,
 }
 
 impl Scene {
@@ -26,12 +26,12 @@ impl Scene {
         let mut uniform = Uniform::new(3);
         let view = random_view(&mut uniform, 40, 30);
         let sane: Vec<ReferenceGaussian> = random_gaussians(&mut uniform, &view, SANE);
-        let by_image = to_image(&view, &random_pixel_gradient(&mut uniform, &view));
-        Self { view, sane: sane.iter().map(to_parameters).collect(), by_image }
+        let grad_image = to_image(&view, &random_pixel_gradient(&mut uniform, &view));
+        Self { view, sane: sane.iter().map(to_parameters).collect(), grad_image }
     }
 
     fn render(&self, level: Level, gaussians: &Gaussians) -> Rendered {
-        Rendered::new(level, gaussians, &self.view, &self.by_image)
+        Rendered::new(level, gaussians, &self.view, &self.grad_image)
     }
 
     /// The sane Gaussians and behind them copies of the first of which one parameter is `value`.

@@ -11,7 +11,7 @@ const GRADIENT_TOLERANCE: f64 = 1e-10;
 
 fn gradients_of(scene: &GoldenScene) -> ReferenceGradients {
     let parts = scene.renderings();
-    scene.total(&parts.map(|part| gradients(&part.gaussians, &part.view, &part.by_pixels, Cutoff::Hard)))
+    scene.total(&parts.map(|part| gradients(&part.gaussians, &part.view, &part.grad_pixels, Cutoff::Hard)))
 }
 
 #[test]

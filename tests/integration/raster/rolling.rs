@@ -33,13 +33,13 @@ struct Scene {
     path: ExposurePath,
     truth: Vec<ReferenceGaussian>,
     gaussians: Gaussians,
-    by_pixels: ReferencePixelGradient,
+    grad_pixels: ReferencePixelGradient,
 }
 
 struct Exposed {
     image: RasterImage,
     gradients: GaussianGradients,
-    by_path: SVector<f64, PATH_PARAMETERS>,
+    grad_path: SVector<f64, PATH_PARAMETERS>,
 }
 
 impl Scene {
@@ -48,11 +48,11 @@ impl Scene {
         let view = random_view(&mut uniform, SIZE[0], SIZE[1]);
         let truth = random_gaussians(&mut uniform, &view, COUNT);
         let gaussians = truth.iter().map(to_parameters).collect();
-        let by_pixels = random_pixel_gradient(&mut uniform, &view);
+        let grad_pixels = random_pixel_gradient(&mut uniform, &view);
         let motion = Vector6::from_fn(|_, _| uniform.within(-0.1, 0.1));
         let ends = ExposureTrajectory::from_mid_and_motion(&view.world_from_camera, &motion);
         let bow = Vector6::from_fn(|_, _| uniform.within(-0.02, 0.02));
-        Self { view, path: ExposurePath { ends, bow }, truth, gaussians, by_pixels }
+        Self { view, path: ExposurePath { ends, bow }, truth, gaussians, grad_pixels }
     }
 
     fn exposed(&self, times: &RowTimes, views: usize) -> Exposed {
@@ -62,9 +62,9 @@ impl Scene {
         let (map, path) = (&self.gaussians, &self.path);
         renderer.forward_rows(map, camera, path, times, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(map.len());
-        let by_image = to_image(&self.view, &self.by_pixels);
-        let by_path = renderer.backward(map, &by_image, &mut scratch, &mut gradients);
-        Exposed { image, gradients, by_path }
+        let grad_image = to_image(&self.view, &self.grad_pixels);
+        let grad_path = renderer.backward(map, &grad_image, &mut scratch, &mut gradients);
+        Exposed { image, gradients, grad_path }
     }
 
     fn seen_at(&self, time: f64) -> RasterView {
@@ -88,7 +88,7 @@ impl Scene {
     fn colour_share(&self, k: usize) -> ReferencePixelGradient {
         let share = |(pixel, colour): (usize, &Vector3<f64>)| colour * Self::share(k, pixel / SIZE[0]);
         let none = vec![0.0; SIZE[0] * SIZE[1]];
-        let colour = self.by_pixels.colour.iter().enumerate().map(share).collect();
+        let colour = self.grad_pixels.colour.iter().enumerate().map(share).collect();
         ReferencePixelGradient { colour, depth: none.clone(), alpha: none }
     }
 }
@@ -150,9 +150,9 @@ fn one_exposure_for_all_rows_is_the_same_bit_for_bit() {
     );
     renderer.forward(&scene.gaussians, camera, &scene.path, 5, *background, &mut scratch, &mut image);
     let mut gradients = GaussianGradients::zeros(COUNT);
-    let by_image = to_image(&scene.view, &scene.by_pixels);
-    let by_path = renderer.backward(&scene.gaussians, &by_image, &mut scratch, &mut gradients);
-    assert!(image == rows.image && gradients == rows.gradients && by_path == rows.by_path);
+    let grad_image = to_image(&scene.view, &scene.grad_pixels);
+    let grad_path = renderer.backward(&scene.gaussians, &grad_image, &mut scratch, &mut gradients);
+    assert!(image == rows.image && gradients == rows.gradients && grad_path == rows.grad_path);
 }
 
 /// Derivative of the pose at `time` by the parameters of the path, by central differences.
@@ -173,16 +173,17 @@ fn gradients_are_the_sums_over_the_oracles_views_of_all_rows() {
     let scene = Scene::new(2);
     let got = scene.exposed(&TIMES, VIEWS);
     let none = vec![Vector3::zeros(); SIZE[0] * SIZE[1]];
-    let of_depth = ReferencePixelGradient { colour: none, ..scene.by_pixels.clone() };
+    let of_depth = ReferencePixelGradient { colour: none, ..scene.grad_pixels.clone() };
     let of_colour = Scene::times().into_iter().enumerate().map(|(k, time)| (time, scene.colour_share(k)));
     let mut mean = vec![Vector3::zeros(); COUNT];
     let mut colour = vec![Vector3::zeros(); COUNT];
     let mut opacity = vec![0.0; COUNT];
-    let mut by_path = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
-    for (time, by_pixels) in of_colour.chain([(0.75, of_depth)]) {
+    let mut grad_path = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
+    for (time, grad_pixels) in of_colour.chain([(0.75, of_depth)]) {
         let view = scene.seen_at(time);
-        let found = gradients(&scene.truth, &view, &by_pixels, Cutoff::Hard);
-        by_path += pose_by_path(&scene.path, time).transpose() * found.view.tangent(&view.world_from_camera);
+        let found = gradients(&scene.truth, &view, &grad_pixels, Cutoff::Hard);
+        grad_path +=
+            pose_by_path(&scene.path, time).transpose() * found.view.tangent(&view.world_from_camera);
         for (k, gradient) in found.gaussians.iter().enumerate() {
             mean[k] += gradient.mean;
             colour[k] += gradient.colour;
@@ -200,8 +201,8 @@ fn gradients_are_the_sums_over_the_oracles_views_of_all_rows() {
     }
     let tolerance = GRADIENT_TOLERANCE * opacity.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     assert_near("opacity", &planes[OPACITY_LOGIT], opacity.into_iter(), tolerance);
-    for (k, (got, want)) in got.by_path.iter().zip(&by_path).enumerate() {
-        let tolerance = GRADIENT_TOLERANCE * by_path.amax();
+    for (k, (got, want)) in got.grad_path.iter().zip(&grad_path).enumerate() {
+        let tolerance = GRADIENT_TOLERANCE * grad_path.amax();
         assert!((got - want).abs() <= tolerance, "parameter {k}: {got}, not {want}");
     }
 }

@@ -13,16 +13,16 @@ fn scene(seed: u64, width: usize, count: usize) -> (Gaussians, RasterView, Raste
     let mut uniform = Uniform::new(seed);
     let view = random_view(&mut uniform, width, 90);
     let gaussians = random_gaussians(&mut uniform, &view, count).iter().map(to_parameters).collect();
-    let by_image = to_image(&view, &random_pixel_gradient(&mut uniform, &view));
-    (gaussians, view, by_image)
+    let grad_image = to_image(&view, &random_pixel_gradient(&mut uniform, &view));
+    (gaussians, view, grad_image)
 }
 
 #[test]
 fn the_number_of_threads_does_not_matter() {
-    let (gaussians, view, by_image) = scene(1, 131, 3000);
+    let (gaussians, view, grad_image) = scene(1, 131, 3000);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
-        pool.install(|| Rendered::new(Level::new(), &gaussians, &view, &by_image))
+        pool.install(|| Rendered::new(Level::new(), &gaussians, &view, &grad_image))
     };
     let one = with(1);
     assert!(one.image.alpha.iter().sum::<f32>() > 1000.0, "there is nothing to see");
@@ -37,13 +37,13 @@ fn used_memory_does_not_matter() {
     let mut scratch = RasterScratch::default();
     let mut image = RasterImage::default();
     for (seed, width, count) in [(1, 131, 3000), (2, 40, 17), (3, 90, 800), (4, 40, 0)] {
-        let (gaussians, view, by_image) = scene(seed, width, count);
+        let (gaussians, view, grad_image) = scene(seed, width, count);
         rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(count);
-        let by_view = rasterizer.backward(&gaussians, &by_image, &mut scratch, &mut gradients);
-        let fresh = Rendered::new(Level::new(), &gaussians, &view, &by_image);
+        let grad_view = rasterizer.backward(&gaussians, &grad_image, &mut scratch, &mut gradients);
+        let fresh = Rendered::new(Level::new(), &gaussians, &view, &grad_image);
         assert!(
-            image == fresh.image && gradients == fresh.gradients && by_view == fresh.view,
+            image == fresh.image && gradients == fresh.gradients && grad_view == fresh.view,
             "scene {seed}"
         );
     }
@@ -51,14 +51,14 @@ fn used_memory_does_not_matter() {
 
 #[test]
 fn gradients_add_up() {
-    let (gaussians, view, by_image) = scene(5, 60, 100);
+    let (gaussians, view, grad_image) = scene(5, 60, 100);
     let rasterizer = Rasterizer::new(Level::new());
     let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
     rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
     let mut twice = GaussianGradients::zeros(100);
-    rasterizer.backward(&gaussians, &by_image, &mut scratch, &mut twice);
+    rasterizer.backward(&gaussians, &grad_image, &mut scratch, &mut twice);
     let once = twice.clone();
-    rasterizer.backward(&gaussians, &by_image, &mut scratch, &mut twice);
+    rasterizer.backward(&gaussians, &grad_image, &mut scratch, &mut twice);
     for (once, twice) in once.parameters.planes().iter().zip(twice.parameters.planes()) {
         assert!(once.iter().zip(twice).all(|(once, twice)| 2.0 * once == *twice), "gradients are not added");
     }

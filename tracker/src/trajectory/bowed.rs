@@ -174,9 +174,9 @@ mod tests {
                     bent.bow[3 + axis] += step;
                     bent.at(s)
                 };
-                let by_bow = left_tangent(&bent(-STEP), &bent(STEP)).fixed_rows::<3>(3) / (2.0 * STEP);
+                let jacobian_bow = left_tangent(&bent(-STEP), &bent(STEP)).fixed_rows::<3>(3) / (2.0 * STEP);
                 let expected = path.bow_blend_left(s).column(axis) * (s - 0.5) * (s - 0.5);
-                assert!((by_bow - expected).norm() < 1e-8, "axis {axis} at {s}");
+                assert!((jacobian_bow - expected).norm() < 1e-8, "axis {axis} at {s}");
             }
         }
     }

@@ -71,8 +71,8 @@ impl ExposurePath {
         let turned = back * jacobian.fixed_view::<3, 12>(3, 0);
         jacobian.fixed_view_mut::<3, 12>(3, 0).copy_from(&turned);
         jacobian.fixed_view_mut::<3, 3>(0, 12).fill_diagonal(height(s));
-        let by_bow = so3::right_jacobian(&turn) * height(s);
-        jacobian.fixed_view_mut::<3, 3>(3, 15).copy_from(&by_bow);
+        let grad_bow = so3::right_jacobian(&turn) * height(s);
+        jacobian.fixed_view_mut::<3, 3>(3, 15).copy_from(&grad_bow);
         jacobian
     }
 

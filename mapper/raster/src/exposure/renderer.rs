@@ -121,7 +121,7 @@ impl ExposureRenderer {
     }
 
     /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
-    /// by the parameters of the path, in the order of [`ExposurePath::pose_jacobian`]. `by_image` is the gradient by the image of the last call of [`Self::forward`]
+    /// by the parameters of the path, in the order of [`ExposurePath::pose_jacobian`]. `grad_image` is the gradient by the image of the last call of [`Self::forward`]
     /// or [`Self::forward_rows`], which had the same Gaussians and the same scratch memory.
     ///
     /// [`GaussianGradients::screen`] gets the sum over the virtual views of the lengths of their gradients: the
@@ -132,7 +132,7 @@ impl ExposureRenderer {
     pub fn backward(
         &self,
         gaussians: &Gaussians,
-        by_image: &RasterImage,
+        grad_image: &RasterImage,
         scratch: &mut ExposureScratch,
         gradients: &mut GaussianGradients,
     ) -> SVector<f64, PATH_PARAMETERS> {
@@ -141,7 +141,7 @@ impl ExposureRenderer {
         let rasters = &mut rasters[..views];
         assert!(views > 0, "backward is for an exposure, and none was rendered before");
         assert!(
-            rasters.iter().all(|raster| raster.fits(gaussians, by_image, gradients)),
+            rasters.iter().all(|raster| raster.fits(gaussians, grad_image, gradients)),
             "backward is for the Gaussians and the size of the exposure that was rendered before"
         );
         rasters.par_iter_mut().enumerate().for_each(|(k, raster)| {
@@ -152,11 +152,11 @@ impl ExposureRenderer {
                 }
                 Some(_) => ViewShare { colour: ColourShare::Same(0.0), geometry: true },
             };
-            self.rasterizer.replay_share(by_image, share, raster);
+            self.rasterizer.replay_share(grad_image, share, raster);
         });
         self.rasterizer.project_views_backward(gaussians, rasters, pose_sums, gradients);
-        let by_view = poses.iter().enumerate();
-        by_view.map(|(k, pose)| pose.by_path(&pose_sums.of_view(k, views))).sum()
+        let grad_view = poses.iter().enumerate();
+        grad_view.map(|(k, pose)| pose.grad_path(&pose_sums.of_view(k, views))).sum()
     }
 }
 
@@ -170,11 +170,11 @@ fn mark_drawn(rasters: &[RasterScratch], count: usize, drawn: &mut Vec<bool>) {
 
 impl VirtualPose {
     fn new(path: &ExposurePath, time: f64) -> Self {
-        Self { world_from_camera: path.at(time), by_path: path.pose_jacobian(time) }
+        Self { world_from_camera: path.at(time), grad_path: path.pose_jacobian(time) }
     }
 
     /// The gradient by the parameters of the path.
-    fn by_path(&self, by_view: &ViewGradient) -> SVector<f64, PATH_PARAMETERS> {
-        self.by_path.transpose() * by_view.tangent(&self.world_from_camera)
+    fn grad_path(&self, grad_view: &ViewGradient) -> SVector<f64, PATH_PARAMETERS> {
+        self.grad_path.transpose() * grad_view.tangent(&self.world_from_camera)
     }
 }

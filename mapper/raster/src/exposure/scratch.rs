@@ -28,7 +28,7 @@ pub struct ExposureScratch {
 pub(super) struct VirtualPose {
     pub(super) world_from_camera: RigidTransform,
     /// Its derivative by the parameters of the path.
-    pub(super) by_path: SMatrix<f64, 6, PATH_PARAMETERS>,
+    pub(super) grad_path: SMatrix<f64, 6, PATH_PARAMETERS>,
 }
 
 impl ExposureScratch {

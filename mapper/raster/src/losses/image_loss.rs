@@ -90,13 +90,13 @@ impl Row<'_> {
         let mut sums = [0.0_f32; 2];
         for (x, (&light, &byte)) in light.iter().zip(bytes).enumerate() {
             let gain = falloff.map_or(gain, |falloff| gain * falloff[x]);
-            let [value, by_light] = curve.at(gain * light);
+            let [value, grad_light] = curve.at(gain * light);
             let target = f32::from(byte) * (1.0 / 255.0);
             let counts = columns.contains(&x) && !(byte >= CLIPPED && value > target);
             let target = if counts { target } else { value };
-            let (loss, by_value) = smooth_absolute(value - target, NOISE);
+            let (loss, grad_value) = smooth_absolute(value - target, NOISE);
             (self.rendered[x], self.captured[x]) = (value, target);
-            (self.slope[x], self.gradient[x]) = (by_light * gain, weight * by_value);
+            (self.slope[x], self.gradient[x]) = (grad_light * gain, weight * grad_value);
             sums[0] += loss;
             sums[1] += (value - target) * (value - target);
         }
@@ -168,7 +168,7 @@ impl DisplayPlanes {
 
     /// Takes the gradient from display values to linear light, and returns the gradient by the logarithm of the gain.
     pub fn gradient_by_light(&self, image: &RasterImage, out: &mut RasterImage) -> f64 {
-        let mut by_gain = 0.0;
+        let mut grad_gain = 0.0;
         for channel in 0..3 {
             let planes = (
                 out.colour[channel].par_chunks_mut(image.width),
@@ -177,17 +177,17 @@ impl DisplayPlanes {
                 image.colour[channel].par_chunks(image.width),
             );
             let of_row = |(out, gradient, slope, light): (&mut [f32], &[f32], &[f32], &[f32])| {
-                let mut by_gain = 0.0;
+                let mut grad_gain = 0.0;
                 for x in 0..out.len() {
                     out[x] = gradient[x] * slope[x];
-                    by_gain += out[x] * light[x];
+                    grad_gain += out[x] * light[x];
                 }
-                by_gain
+                grad_gain
             };
             let of_rows: Vec<f32> = planes.into_par_iter().map(of_row).collect();
-            by_gain += of_rows.into_iter().map(f64::from).sum::<f64>();
+            grad_gain += of_rows.into_iter().map(f64::from).sum::<f64>();
         }
-        by_gain
+        grad_gain
     }
 }
 
@@ -206,25 +206,25 @@ pub fn compare_depth(
         image.alpha.par_chunks(image.width),
         seen.depth.par_chunks(image.width),
     );
-    let of_row = |(by_depth, by_alpha, depth, alpha, measured): DepthRow<'_>| {
+    let of_row = |(grad_depth, grad_alpha, depth, alpha, measured): DepthRow<'_>| {
         let mut sum = 0.0;
-        for x in 0..by_depth.len() {
-            (by_depth[x], by_alpha[x]) = (0.0, 0.0);
+        for x in 0..grad_depth.len() {
+            (grad_depth[x], grad_alpha[x]) = (0.0, 0.0);
             if measured[x] <= 0.0 {
                 continue;
             }
             sum += weights.alpha * share * (1.0 - alpha[x]);
-            by_alpha[x] = -weights.alpha * share;
+            grad_alpha[x] = -weights.alpha * share;
             if alpha[x] < OPAQUE || depth[x] < 0.1 * alpha[x] {
                 continue;
             }
             // Inverse depth A/D: the noise of sensors is uniform there.
             let inverse = alpha[x] / depth[x];
-            let (loss, by_inverse) = smooth_absolute(inverse - 1.0 / measured[x], DEPTH_NOISE);
+            let (loss, grad_inverse) = smooth_absolute(inverse - 1.0 / measured[x], DEPTH_NOISE);
             let scale = weights.depth * share;
             sum += scale * loss;
-            by_depth[x] = -scale * by_inverse * inverse / depth[x];
-            by_alpha[x] += scale * by_inverse / depth[x];
+            grad_depth[x] = -scale * grad_inverse * inverse / depth[x];
+            grad_alpha[x] += scale * grad_inverse / depth[x];
         }
         sum
     };
@@ -289,15 +289,15 @@ mod tests {
         let (seen, mut planes) = (observation(), DisplayPlanes::default());
         let mut gradient = RasterImage::zeros(SIZE[0], SIZE[1]);
         let mut terms = planes.compare(&curve, gain, image, &seen, WEIGHTS.colour);
-        let by_log_gain = planes.gradient_by_light(image, &mut gradient);
+        let grad_log_gain = planes.gradient_by_light(image, &mut gradient);
         terms.depth = compare_depth(image, &seen, &WEIGHTS, &mut gradient);
-        (terms.total(), gradient, by_log_gain)
+        (terms.total(), gradient, grad_log_gain)
     }
 
     #[test]
     fn gradients_are_those_of_finite_differences() {
         let (step, image) = (2e-3_f32, image());
-        let (_, gradient, by_log_gain) = loss(&image, 1.1);
+        let (_, gradient, grad_log_gain) = loss(&image, 1.1);
         let check = |what: &str, pixel: usize, analytic: f32, change: &dyn Fn(&mut RasterImage, f32)| {
             let moved = |by: f32| {
                 let mut moved = image.clone();
@@ -315,7 +315,10 @@ mod tests {
             check("alpha", pixel, gradient.alpha[pixel], &|image, by| image.alpha[pixel] += by);
         }
         let numeric = (loss(&image, 1.1 * 1.001).0 - loss(&image, 1.1 / 1.001).0) / (2.0 * 1.001_f64.ln());
-        assert!((numeric - by_log_gain).abs() < 1e-3 + 0.02 * numeric.abs(), "{by_log_gain}, not {numeric}");
+        assert!(
+            (numeric - grad_log_gain).abs() < 1e-3 + 0.02 * numeric.abs(),
+            "{grad_log_gain}, not {numeric}"
+        );
     }
 
     #[test]

@@ -28,9 +28,9 @@ pub(super) type SplatSums = [f32; 12];
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(super) struct GradientCell {
-    by_colour: [[f32; CELL]; 3],
-    by_depth: [f32; CELL],
-    by_alpha: [f32; CELL],
+    grad_colour: [[f32; CELL]; 3],
+    grad_depth: [f32; CELL],
+    grad_alpha: [f32; CELL],
     /// Transmittance in front of the splats visited so far.
     transmittance: [f32; CELL],
     /// Worth of everything visited so far, seen through nothing.
@@ -42,8 +42,8 @@ pub(super) struct GradientCell {
 impl GradientCell {
     /// The given gradient by red, green, blue, depth and alpha.
     pub(super) fn given_mut(&mut self) -> [&mut [f32; CELL]; 5] {
-        let [red, green, blue] = self.by_colour.each_mut();
-        [red, green, blue, &mut self.by_depth, &mut self.by_alpha]
+        let [red, green, blue] = self.grad_colour.each_mut();
+        [red, green, blue, &mut self.grad_depth, &mut self.grad_alpha]
     }
 
     /// Forgets the given gradient.
@@ -85,8 +85,8 @@ fn start<S: Simd>(simd: S, background: &[f32; 3], pixels: &TilePixels, gradient:
     for (cell, pixels) in cells {
         for at in (0..CELL).step_by(S::f32s::LEN) {
             let mut behind = S::f32s::splat(simd, 0.0);
-            for (by_colour, &background) in cell.by_colour.iter().zip(background) {
-                behind = load(by_colour, at).mul_add(background, behind);
+            for (grad_colour, &background) in cell.grad_colour.iter().zip(background) {
+                behind = load(grad_colour, at).mul_add(background, behind);
             }
             behind.store_slice(&mut cell.behind[at..at + S::f32s::LEN]);
             let transmittance = load(&pixels.transmittance, at).abs();
@@ -145,13 +145,14 @@ impl<S: Simd> Sums<S> {
         let transmittance = load(&cell.transmittance) / (S::f32s::splat(simd, 1.0) - alpha);
         let weight = alpha * transmittance;
 
-        let by_colour = [load(&cell.by_colour[0]), load(&cell.by_colour[1]), load(&cell.by_colour[2])];
+        let grad_colour =
+            [load(&cell.grad_colour[0]), load(&cell.grad_colour[1]), load(&cell.grad_colour[2])];
         let mut worth = zero;
         if GEOMETRY {
-            worth = load(&cell.by_depth).mul_add(at.depth(simd, splat), load(&cell.by_alpha));
+            worth = load(&cell.grad_depth).mul_add(at.depth(simd, splat), load(&cell.grad_alpha));
         }
-        for (by_colour, &colour) in by_colour.iter().zip(&splat.colour) {
-            worth = by_colour.mul_add(colour, worth);
+        for (grad_colour, &colour) in grad_colour.iter().zip(&splat.colour) {
+            worth = grad_colour.mul_add(colour, worth);
         }
         let behind = load(&cell.behind);
         let gain = worth - behind;
@@ -159,24 +160,24 @@ impl<S: Simd> Sums<S> {
         transmittance.store_slice(&mut cell.transmittance[pixels.clone()]);
 
         // At the ceiling alpha does not move.
-        let by_logarithm = at.raw.simd_lt(MAX_ALPHA as f32).select(weight * gain, zero);
-        let along_u = by_logarithm * at.u;
-        let along_v = by_logarithm * at.v;
+        let grad_logarithm = at.raw.simd_lt(MAX_ALPHA as f32).select(weight * gain, zero);
+        let along_u = grad_logarithm * at.u;
+        let along_v = grad_logarithm * at.v;
         let sums = &mut self.0;
-        sums[0] += by_logarithm;
+        sums[0] += grad_logarithm;
         sums[1] += along_u;
         sums[2] += along_v;
         sums[3] = along_u.mul_add(at.u, sums[3]);
         sums[4] = along_u.mul_add(at.v, sums[4]);
         sums[5] = along_v.mul_add(at.v, sums[5]);
-        for (sum, by_colour) in sums[6..9].iter_mut().zip(by_colour) {
-            *sum = weight.mul_add(by_colour, *sum);
+        for (sum, grad_colour) in sums[6..9].iter_mut().zip(grad_colour) {
+            *sum = weight.mul_add(grad_colour, *sum);
         }
         if GEOMETRY {
-            let by_depth = weight * load(&cell.by_depth);
-            sums[9] += by_depth;
-            sums[10] = by_depth.mul_add(at.u, sums[10]);
-            sums[11] = by_depth.mul_add(at.v, sums[11]);
+            let grad_depth = weight * load(&cell.grad_depth);
+            sums[9] += grad_depth;
+            sums[10] = grad_depth.mul_add(at.u, sums[10]);
+            sums[11] = grad_depth.mul_add(at.v, sums[11]);
         }
     }
 

@@ -177,7 +177,7 @@ impl Rasterizer {
     }
 
     /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
-    /// by the pose. `by_image` is the gradient by the image of the last call of [`Self::forward`], which had the
+    /// by the pose. `grad_image` is the gradient by the image of the last call of [`Self::forward`], which had the
     /// same Gaussians and the same scratch memory.
     ///
     /// # Panics
@@ -185,15 +185,15 @@ impl Rasterizer {
     pub fn backward(
         &self,
         gaussians: &Gaussians,
-        by_image: &RasterImage,
+        grad_image: &RasterImage,
         scratch: &mut RasterScratch,
         gradients: &mut GaussianGradients,
     ) -> ViewGradient {
         assert!(
-            scratch.fits(gaussians, by_image, gradients),
+            scratch.fits(gaussians, grad_image, gradients),
             "backward is for the Gaussians and the size of the view that was rendered before"
         );
-        self.replay(by_image, scratch);
+        self.replay(grad_image, scratch);
         self.project_backward(gaussians, scratch, gradients)
     }
 
@@ -288,20 +288,20 @@ impl Rasterizer {
     }
 
     /// First stage of [`Self::backward`], of which the conditions hold: sums of every splat over every tile.
-    pub fn replay(&self, by_image: &RasterImage, scratch: &mut RasterScratch) {
-        self.replay_share(by_image, ViewShare::WHOLE, scratch);
+    pub fn replay(&self, grad_image: &RasterImage, scratch: &mut RasterScratch) {
+        self.replay_share(grad_image, ViewShare::WHOLE, scratch);
     }
 
     /// [`Self::replay`] for an image of which the view has a share.
     pub(crate) fn replay_share(
         &self,
-        by_image: &RasterImage,
+        grad_image: &RasterImage,
         share: ViewShare<'_>,
         scratch: &mut RasterScratch,
     ) {
         let mut sums = core::mem::take(&mut scratch.sums);
         sums.resize(scratch.bins.entries.len(), [0.0; 12]);
-        let input = Replay { by_image, share, scratch };
+        let input = Replay { grad_image, share, scratch };
         self.replay_tiles(&input, 0..scratch.bins.grid.len(), &mut sums);
         scratch.sums = sums;
     }
@@ -317,10 +317,10 @@ impl Rasterizer {
                 || self.replay_tiles(input, middle..tiles.end, right),
             );
         } else if !sums.is_empty() {
-            let Replay { by_image, share, scratch } = input;
+            let Replay { grad_image, share, scratch } = input;
             let tile = tiles.start;
             let mut gradient = TileGradient::default();
-            load_gradient(by_image, *share, &scratch.bins.grid, tile, &mut gradient);
+            load_gradient(grad_image, *share, &scratch.bins.grid, tile, &mut gradient);
             let splats = tile_splats(&scratch.order, &scratch.bins, tile);
             let (pixels, background) = (&scratch.tiles[tile], &scratch.background);
             let backward = if share.geometry { backward::<true> } else { backward::<false> };
@@ -384,7 +384,7 @@ impl Rasterizer {
 
 /// What replaying a view needs.
 struct Replay<'a> {
-    by_image: &'a RasterImage,
+    grad_image: &'a RasterImage,
     share: ViewShare<'a>,
     scratch: &'a RasterScratch,
 }

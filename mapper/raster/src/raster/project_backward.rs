@@ -39,7 +39,7 @@ pub(super) struct SplatGradients<'a> {
 }
 
 /// Gradient by the splats of eight Gaussians.
-struct BySplat<S: Simd> {
+struct SplatGradientLanes<S: Simd> {
     centre: [f32x8<S>; 2],
     /// By the covariance on the image: xx, xy (both places together), yy.
     covariance: [f32x8<S>; 3],
@@ -67,32 +67,32 @@ fn backward_range<S: Simd>(
     first: usize,
     out: &mut GradientRange,
 ) -> ViewSums {
-    let mut by_view = [[f32x8::splat(simd, 0.0); 4]; 3];
+    let mut grad_view = [[f32x8::splat(simd, 0.0); 4]; 3];
     let mut sums = [[0.0; LANES]; SUMS];
     let ranks = input.rank_from_gaussian[first..first + out.planes.len()].chunks(LANES);
     for (step, ranks) in ranks.enumerate() {
         if reduce(ranks, input.bins, input.sums, &mut sums) {
             let at = step * LANES;
             let lanes = Lanes::new(simd, input.view, &load(simd, input.planes, first + at));
-            let by_splat = BySplat::new(simd, &lanes, &sums);
-            let (by_parameters, by_rows) = lanes.backward(input.view, &by_splat);
-            let finite = is_finite(simd, &by_parameters);
-            add(out, at, ranks.len(), finite, &by_parameters, &by_splat);
+            let grad_splat = SplatGradientLanes::new(simd, &lanes, &sums);
+            let (grad_parameters, grad_rows) = lanes.backward(input.view, &grad_splat);
+            let finite = is_finite(simd, &grad_parameters);
+            add(out, at, ranks.len(), finite, &grad_parameters, &grad_splat);
             let zero = f32x8::splat(simd, 0.0);
-            for (sum, row) in by_view.as_flattened_mut().iter_mut().zip(by_rows.as_flattened()) {
+            for (sum, row) in grad_view.as_flattened_mut().iter_mut().zip(grad_rows.as_flattened()) {
                 *sum += finite.select(*row, zero);
             }
         }
     }
     let mut totals = [0.0; 12];
-    totals.iter_mut().zip(by_view.as_flattened()).for_each(|(total, sum)| *total = sum.reduce_sum());
+    totals.iter_mut().zip(grad_view.as_flattened()).for_each(|(total, sum)| *total = sum.reduce_sum());
     totals
 }
 
 /// Gaussians whose numbers overflowed get no gradient.
 #[inline(always)]
-fn is_finite<S: Simd>(simd: S, by_parameters: &[f32x8<S>; PARAMETERS]) -> mask32x8<S> {
-    by_parameters.iter().fold(f32x8::splat(simd, 0.0), |sum, &value| sum + value * 0.0).simd_eq(0.0)
+fn is_finite<S: Simd>(simd: S, grad_parameters: &[f32x8<S>; PARAMETERS]) -> mask32x8<S> {
+    grad_parameters.iter().fold(f32x8::splat(simd, 0.0), |sum, &value| sum + value * 0.0).simd_eq(0.0)
 }
 
 #[inline(always)]
@@ -101,10 +101,10 @@ fn add<S: Simd>(
     at: usize,
     count: usize,
     finite: mask32x8<S>,
-    by_parameters: &[f32x8<S>; PARAMETERS],
-    by_splat: &BySplat<S>,
+    grad_parameters: &[f32x8<S>; PARAMETERS],
+    grad_splat: &SplatGradientLanes<S>,
 ) {
-    let [u, v] = by_splat.centre;
+    let [u, v] = grad_splat.centre;
     let screen = u.mul_add(u, v * v).sqrt();
     let zero = f32x8::splat(u.token(), 0.0);
     let add = |plane: &mut [f32], values: f32x8<S>| {
@@ -116,13 +116,13 @@ fn add<S: Simd>(
             plane.iter_mut().enumerate().for_each(|(lane, sum)| *sum += values[lane]);
         }
     };
-    for (plane, &values) in out.planes.planes.iter_mut().zip(by_parameters) {
+    for (plane, &values) in out.planes.planes.iter_mut().zip(grad_parameters) {
         add(plane, values);
     }
     add(out.screen, screen);
 }
 
-impl<S: Simd> BySplat<S> {
+impl<S: Simd> SplatGradientLanes<S> {
     /// From the sums of [`SplatSums`]. With `w = W d` the offset d in units of standard deviations, the gradient
     /// by the centre is `W^T sum(s w)`, that by the covariance `W^T sum(s w w^T) W / 2`.
     ///
@@ -170,15 +170,15 @@ impl<S: Simd> Lanes<S> {
     fn backward(
         &self,
         view: &ViewNumbers,
-        by_splat: &BySplat<S>,
+        grad_splat: &SplatGradientLanes<S>,
     ) -> ([f32x8<S>; PARAMETERS], LaneMatrix<S, 3, 4>) {
-        let by_axes_image = self.by_axes_image(by_splat);
+        let grad_axes_image = self.grad_axes_image(grad_splat);
         let [across_x, across_y] = each(
             #[inline(always)]
             |i| self.inverse_z * view.focal[i],
         );
-        let by_axes_camera: LaneMatrix<S, 3, 3> = {
-            let [v, w] = by_axes_image;
+        let grad_axes_camera: LaneMatrix<S, 3, 3> = {
+            let [v, w] = grad_axes_image;
             let (x, y) = (across_x * self.slope[0], across_y * self.slope[1]);
             [
                 each(
@@ -191,45 +191,45 @@ impl<S: Simd> Lanes<S> {
                 ),
                 each(
                     #[inline(always)]
-                    |j| self.by_along(by_splat, j) - (v[j] * x + w[j] * y),
+                    |j| self.grad_along(grad_splat, j) - (v[j] * x + w[j] * y),
                 ),
             ]
         };
-        let by_x_camera = self.by_x_camera(view, by_splat, &by_axes_image);
-        let by_axes_world = rotate_back(view, &by_axes_camera);
+        let grad_x_camera = self.grad_x_camera(view, grad_splat, &grad_axes_image);
+        let grad_axes_world = rotate_back(view, &grad_axes_camera);
 
         let zero = f32x8::splat(self.opacity.token(), 0.0);
-        let mut by_parameters = [zero; PARAMETERS];
+        let mut grad_parameters = [zero; PARAMETERS];
         for j in 0..3 {
-            by_parameters[MEAN + j] = column(&view.rotation, j, &by_x_camera);
-            by_parameters[LOG_SCALE + j] = (0..3).fold(
+            grad_parameters[MEAN + j] = column(&view.rotation, j, &grad_x_camera);
+            grad_parameters[LOG_SCALE + j] = (0..3).fold(
                 zero,
                 #[inline(always)]
-                |sum, i| by_axes_world[i][j].mul_add(self.axes_world[i][j], sum),
+                |sum, i| grad_axes_world[i][j].mul_add(self.axes_world[i][j], sum),
             );
-            by_parameters[COLOUR + j] = by_splat.colour[j];
+            grad_parameters[COLOUR + j] = grad_splat.colour[j];
         }
-        let by_quaternion = self.by_quaternion(&by_axes_world);
-        by_parameters[ROTATION..ROTATION + 4].copy_from_slice(&by_quaternion);
-        by_parameters[OPACITY_LOGIT] = by_splat.opacity_logit;
-        (by_parameters, self.by_view(&by_axes_camera, &by_x_camera))
+        let grad_quaternion = self.grad_quaternion(&grad_axes_world);
+        grad_parameters[ROTATION..ROTATION + 4].copy_from_slice(&grad_quaternion);
+        grad_parameters[OPACITY_LOGIT] = grad_splat.opacity_logit;
+        (grad_parameters, self.grad_view(&grad_axes_camera, &grad_x_camera))
     }
 
     /// By the camera z of axis `j` through the covariance with it.
     #[inline(always)]
-    fn by_along(&self, by_splat: &BySplat<S>, j: usize) -> f32x8<S> {
+    fn grad_along(&self, grad_splat: &SplatGradientLanes<S>, j: usize) -> f32x8<S> {
         let [v, w] = &self.axes_image;
-        by_splat.with_z[0].mul_add(v[j], by_splat.with_z[1] * w[j])
+        grad_splat.with_z[0].mul_add(v[j], grad_splat.with_z[1] * w[j])
     }
 
     /// By the axes on the image: twice the gradient by the covariance, times the axes, and that by the covariance with
     /// camera z, times the camera z of the axes.
     #[inline(always)]
-    fn by_axes_image(&self, by_splat: &BySplat<S>) -> LaneMatrix<S, 2, 3> {
-        let [xx, xy, yy] = by_splat.covariance;
+    fn grad_axes_image(&self, grad_splat: &SplatGradientLanes<S>) -> LaneMatrix<S, 2, 3> {
+        let [xx, xy, yy] = grad_splat.covariance;
         let (xx, yy) = (xx + xx, yy + yy);
         let [v, w] = &self.axes_image;
-        let (along, [hx, hy]) = (&self.axes_camera[2], by_splat.with_z);
+        let (along, [hx, hy]) = (&self.axes_camera[2], grad_splat.with_z);
         [
             each(
                 #[inline(always)]
@@ -244,35 +244,35 @@ impl<S: Simd> Lanes<S> {
 
     /// By the centre in the camera frame: it moves the splat, its depth, and the Jacobian that shapes it.
     #[inline(always)]
-    fn by_x_camera(
+    fn grad_x_camera(
         &self,
         view: &ViewNumbers,
-        by_splat: &BySplat<S>,
-        by_axes_image: &LaneMatrix<S, 2, 3>,
+        grad_splat: &SplatGradientLanes<S>,
+        grad_axes_image: &LaneMatrix<S, 2, 3>,
     ) -> [f32x8<S>; 3] {
         let zero = f32x8::splat(self.opacity.token(), 0.0);
-        let mut by_x = [zero, zero, by_splat.depth];
+        let mut grad_x = [zero, zero, grad_splat.depth];
         for i in 0..2 {
             let per_pixel = self.inverse_z * view.focal[i];
-            let by_centre = by_splat.centre[i] * per_pixel;
-            by_x[i] = by_centre;
-            by_x[2] -= by_centre * (self.x_camera[i] * self.inverse_z);
+            let grad_centre = grad_splat.centre[i] * per_pixel;
+            grad_x[i] = grad_centre;
+            grad_x[2] -= grad_centre * (self.x_camera[i] * self.inverse_z);
             // An image axis is (across - slope along) f/z: it shrinks with z and turns with the slope.
-            let shrink = dot3(&by_axes_image[i], &self.axes_image[i]) * self.inverse_z;
-            let turn = dot3(&by_axes_image[i], &self.axes_camera[2]) * per_pixel * self.inverse_z;
+            let shrink = dot3(&grad_axes_image[i], &self.axes_image[i]) * self.inverse_z;
+            let turn = dot3(&grad_axes_image[i], &self.axes_camera[2]) * per_pixel * self.inverse_z;
             let turn = self.follows[i].select(turn, zero);
-            by_x[2] -= shrink;
-            by_x[i] -= turn;
-            by_x[2] = turn.mul_add(self.slope[i], by_x[2]);
+            grad_x[2] -= shrink;
+            grad_x[i] -= turn;
+            grad_x[2] = turn.mul_add(self.slope[i], grad_x[2]);
         }
-        by_x
+        grad_x
     }
 
     /// By the quaternion through its normalisation. With t the gradient by a small turn of the axes in the world,
     /// it is `2 (0, t) q/|q|`: nothing along q, and no symmetric part that would have to cancel.
     #[inline(always)]
-    fn by_quaternion(&self, by_axes_world: &LaneMatrix<S, 3, 3>) -> [f32x8<S>; 4] {
-        let (a, g) = (&self.axes_world, by_axes_world);
+    fn grad_quaternion(&self, grad_axes_world: &LaneMatrix<S, 3, 3>) -> [f32x8<S>; 4] {
+        let (a, g) = (&self.axes_world, grad_axes_world);
         let turn: [f32x8<S>; 3] = each(
             #[inline(always)]
             |axis| {
@@ -293,21 +293,21 @@ impl<S: Simd> Lanes<S> {
 
     /// By the rows of R and t.
     #[inline(always)]
-    fn by_view(
+    fn grad_view(
         &self,
-        by_axes_camera: &LaneMatrix<S, 3, 3>,
-        by_x_camera: &[f32x8<S>; 3],
+        grad_axes_camera: &LaneMatrix<S, 3, 3>,
+        grad_x_camera: &[f32x8<S>; 3],
     ) -> LaneMatrix<S, 3, 4> {
         each(
             #[inline(always)]
             |i| {
-                let by_x = by_x_camera[i];
-                let axes = &by_axes_camera[i];
+                let grad_x = grad_x_camera[i];
+                let axes = &grad_axes_camera[i];
                 let [x, y, z] = each(
                     #[inline(always)]
-                    |j| by_x.mul_add(self.mean[j], dot3(axes, &self.axes_world[j])),
+                    |j| grad_x.mul_add(self.mean[j], dot3(axes, &self.axes_world[j])),
                 );
-                [x, y, z, by_x]
+                [x, y, z, grad_x]
             },
         )
     }

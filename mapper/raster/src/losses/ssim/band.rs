@@ -171,7 +171,7 @@ impl Band {
         let [first, second, squares, product] = self.moments.each_ref();
         let [first, second] = [shifted(first, chunks), shifted(second, chunks)];
         let [squares, product] = [shifted(squares, chunks), shifted(product, chunks)];
-        let [constant, by_estimate, by_reference] =
+        let [constant, grad_estimate, grad_reference] =
             self.factors.each_mut().map(|row| &mut row[MARGIN..].as_chunks_mut::<LANES>().0[..chunks]);
         let lanes = f32x8::from_slice(simd, &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
         let zero = f32x8::splat(simd, 0.0);
@@ -188,8 +188,8 @@ impl Band {
             let inside = lanes.simd_lt((across - LANES * chunk) as f32);
             sum += inside.select(likeness.similarity, zero);
             inside.select(likeness.constant, zero).store_slice(&mut constant[chunk]);
-            inside.select(likeness.by_estimate, zero).store_slice(&mut by_estimate[chunk]);
-            inside.select(likeness.by_reference, zero).store_slice(&mut by_reference[chunk]);
+            inside.select(likeness.grad_estimate, zero).store_slice(&mut grad_estimate[chunk]);
+            inside.select(likeness.grad_reference, zero).store_slice(&mut grad_reference[chunk]);
         }
         f64::from(sum.reduce_sum())
     }
@@ -249,8 +249,8 @@ impl Band {
 struct Likeness<S: Simd> {
     similarity: f32x8<S>,
     constant: f32x8<S>,
-    by_estimate: f32x8<S>,
-    by_reference: f32x8<S>,
+    grad_estimate: f32x8<S>,
+    grad_reference: f32x8<S>,
 }
 
 impl<S: Simd> Likeness<S> {
@@ -272,12 +272,12 @@ impl<S: Simd> Likeness<S> {
         let inverse = f32x8::splat(simd, 1.0) / (b1 * b2);
         let similarity = a1 * a2 * inverse;
         let twice = inverse + inverse;
-        let by_mean = mean_x * a2 - x * a1 - similarity * (mean_y * b2 - y * b1);
+        let grad_mean = mean_x * a2 - x * a1 - similarity * (mean_y * b2 - y * b1);
         Self {
             similarity,
-            constant: by_mean * twice,
-            by_estimate: -(similarity * b1 * twice),
-            by_reference: a1 * twice,
+            constant: grad_mean * twice,
+            grad_estimate: -(similarity * b1 * twice),
+            grad_reference: a1 * twice,
         }
     }
 }

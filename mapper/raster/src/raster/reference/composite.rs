@@ -72,16 +72,16 @@ impl Splat {
 
 /// Alpha after ceiling and cutoff, and its derivative by `ln raw`; `None` if the splat is skipped.
 fn effective_alpha(raw: f64, cutoff: Cutoff) -> Option<(f64, f64)> {
-    let (alpha, by_logarithm) = if raw < MAX_ALPHA { (raw, raw) } else { (MAX_ALPHA, 0.0) };
+    let (alpha, grad_logarithm) = if raw < MAX_ALPHA { (raw, raw) } else { (MAX_ALPHA, 0.0) };
     // From here up to twice as much, the smooth cutoff fades a splat in.
     let excess = (alpha - MIN_ALPHA) / MIN_ALPHA;
     match cutoff {
-        Cutoff::Hard => (alpha >= MIN_ALPHA).then_some((alpha, by_logarithm)),
-        Cutoff::Smooth if excess >= 1.0 => Some((alpha, by_logarithm)),
+        Cutoff::Hard => (alpha >= MIN_ALPHA).then_some((alpha, grad_logarithm)),
+        Cutoff::Smooth if excess >= 1.0 => Some((alpha, grad_logarithm)),
         Cutoff::Smooth => (excess > 0.0).then(|| {
             let fade = excess * excess * (3.0 - 2.0 * excess);
             let fade_by_alpha = 6.0 * excess * (1.0 - excess) / MIN_ALPHA;
-            (alpha * fade, by_logarithm * (fade + alpha * fade_by_alpha))
+            (alpha * fade, grad_logarithm * (fade + alpha * fade_by_alpha))
         }),
     }
 }
@@ -98,30 +98,30 @@ impl Pixel {
         &self,
         splats: &[Splat],
         background: &Vector3<f64>,
-        by_pixel: &PixelGradient,
+        grad_pixel: &PixelGradient,
         gradients: &mut [SplatGradient],
     ) {
-        let mut behind = by_pixel.colour.dot(background);
+        let mut behind = grad_pixel.colour.dot(background);
         for contribution in self.contributions.iter().rev() {
             let splat = &splats[contribution.splat];
             let gradient = &mut gradients[contribution.splat];
             let weight = contribution.alpha * contribution.transmittance;
-            gradient.colour += weight * by_pixel.colour;
+            gradient.colour += weight * grad_pixel.colour;
             let offset = contribution.offset;
-            let by_depth = weight * by_pixel.depth;
-            gradient.depth += by_depth;
-            gradient.tilt += by_depth * offset;
-            gradient.centre -= by_depth * splat.tilt;
+            let grad_depth = weight * grad_pixel.depth;
+            gradient.depth += grad_depth;
+            gradient.tilt += grad_depth * offset;
+            gradient.centre -= grad_depth * splat.tilt;
 
             let depth = splat.depth_at(&offset);
-            let own = by_pixel.colour.dot(&splat.colour) + by_pixel.depth * depth + by_pixel.alpha;
-            let by_alpha = contribution.transmittance * (own - behind);
-            let by_logarithm = by_alpha * contribution.alpha_by_logarithm;
-            gradient.opacity += by_logarithm / splat.opacity;
-            gradient.centre += by_logarithm * (splat.conic * offset);
-            gradient.conic[0] -= by_logarithm * 0.5 * offset.x * offset.x;
-            gradient.conic[1] -= by_logarithm * offset.x * offset.y;
-            gradient.conic[2] -= by_logarithm * 0.5 * offset.y * offset.y;
+            let own = grad_pixel.colour.dot(&splat.colour) + grad_pixel.depth * depth + grad_pixel.alpha;
+            let grad_alpha = contribution.transmittance * (own - behind);
+            let grad_logarithm = grad_alpha * contribution.alpha_by_logarithm;
+            gradient.opacity += grad_logarithm / splat.opacity;
+            gradient.centre += grad_logarithm * (splat.conic * offset);
+            gradient.conic[0] -= grad_logarithm * 0.5 * offset.x * offset.x;
+            gradient.conic[1] -= grad_logarithm * offset.x * offset.y;
+            gradient.conic[2] -= grad_logarithm * 0.5 * offset.y * offset.y;
             behind += contribution.alpha * (own - behind);
         }
     }

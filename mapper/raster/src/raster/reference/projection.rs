@@ -71,29 +71,29 @@ pub(super) fn project_backward(
 ) -> ReferenceGradient {
     let steps = Steps::new(gaussian, view);
     let [gxx, gxy, gyy] = splat.conic;
-    let by_conic = Matrix2::new(gxx, 0.5 * gxy, 0.5 * gxy, gyy);
+    let grad_conic = Matrix2::new(gxx, 0.5 * gxy, 0.5 * gxy, gyy);
     let image_axes = steps.jacobian * steps.axes_camera;
     // The tilt is the inverse of one covariance times another, that of the offset on the image with camera z.
-    let by_covariance_with_z = steps.tilt_conic * splat.tilt;
-    let by_tilt_covariance = -by_covariance_with_z * steps.tilt.transpose();
-    let by_covariance = -steps.conic * by_conic * steps.conic;
-    let by_image_axes = 2.0 * by_covariance * image_axes
-        + (by_tilt_covariance + by_tilt_covariance.transpose()) * image_axes
-        + by_covariance_with_z * steps.axes_camera.row(2);
-    let by_jacobian = by_image_axes * steps.axes_camera.transpose();
-    let mut by_axes_camera = steps.jacobian.transpose() * by_image_axes;
-    by_axes_camera.set_row(2, &(by_axes_camera.row(2) + by_covariance_with_z.transpose() * image_axes));
-    let by_axes_world = steps.world_to_camera.transpose() * by_axes_camera;
-    let by_x_camera = steps.by_x_camera(view, splat, &by_jacobian);
+    let grad_covariance_with_z = steps.tilt_conic * splat.tilt;
+    let grad_tilt_covariance = -grad_covariance_with_z * steps.tilt.transpose();
+    let grad_covariance = -steps.conic * grad_conic * steps.conic;
+    let grad_image_axes = 2.0 * grad_covariance * image_axes
+        + (grad_tilt_covariance + grad_tilt_covariance.transpose()) * image_axes
+        + grad_covariance_with_z * steps.axes_camera.row(2);
+    let grad_jacobian = grad_image_axes * steps.axes_camera.transpose();
+    let mut grad_axes_camera = steps.jacobian.transpose() * grad_image_axes;
+    grad_axes_camera.set_row(2, &(grad_axes_camera.row(2) + grad_covariance_with_z.transpose() * image_axes));
+    let grad_axes_world = steps.world_to_camera.transpose() * grad_axes_camera;
+    let grad_x_camera = steps.grad_x_camera(view, splat, &grad_jacobian);
 
     view_gradient.rotation +=
-        by_axes_camera * steps.axes_world.transpose() + by_x_camera * gaussian.mean.transpose();
-    view_gradient.translation += by_x_camera;
-    let by_orientation = by_axes_world * Matrix3::from_diagonal(&gaussian.scale);
+        grad_axes_camera * steps.axes_world.transpose() + grad_x_camera * gaussian.mean.transpose();
+    view_gradient.translation += grad_x_camera;
+    let grad_orientation = grad_axes_world * Matrix3::from_diagonal(&gaussian.scale);
     ReferenceGradient {
-        mean: steps.world_to_camera.transpose() * by_x_camera,
-        scale: Vector3::from_fn(|j, _| steps.orientation.column(j).dot(&by_axes_world.column(j))),
-        rotation: steps.by_quaternion(&by_orientation),
+        mean: steps.world_to_camera.transpose() * grad_x_camera,
+        scale: Vector3::from_fn(|j, _| steps.orientation.column(j).dot(&grad_axes_world.column(j))),
+        rotation: steps.grad_quaternion(&grad_orientation),
         opacity: splat.opacity,
         colour: splat.colour,
         splat: *splat,
@@ -139,43 +139,43 @@ impl Steps {
     }
 
     /// The centre moves the splat, its depth, and the Jacobian that shapes it.
-    fn by_x_camera(
+    fn grad_x_camera(
         &self,
         view: &RasterView,
         splat: &SplatGradient,
-        by_jacobian: &Matrix2x3<f64>,
+        grad_jacobian: &Matrix2x3<f64>,
     ) -> Vector3<f64> {
         let focal = [view.camera.fx, view.camera.fy];
         let z = self.x_camera.z;
-        let mut by_x = Vector3::new(0.0, 0.0, splat.depth);
+        let mut grad_x = Vector3::new(0.0, 0.0, splat.depth);
         for i in 0..2 {
-            let by_centre = splat.centre[i] * focal[i] / z;
-            by_x[i] += by_centre;
-            by_x.z -= by_centre * self.x_camera[i] / z;
-            let (by_diagonal, by_last) = (by_jacobian[(i, i)], by_jacobian[(i, 2)]);
-            by_x.z -= by_diagonal * focal[i] / (z * z);
-            by_x.z += by_last * focal[i] * self.slope[i] / (z * z);
+            let grad_centre = splat.centre[i] * focal[i] / z;
+            grad_x[i] += grad_centre;
+            grad_x.z -= grad_centre * self.x_camera[i] / z;
+            let (grad_diagonal, grad_last) = (grad_jacobian[(i, i)], grad_jacobian[(i, 2)]);
+            grad_x.z -= grad_diagonal * focal[i] / (z * z);
+            grad_x.z += grad_last * focal[i] * self.slope[i] / (z * z);
             if self.follows[i] {
-                let by_slope = -by_last * focal[i] / z;
-                by_x[i] += by_slope / z;
-                by_x.z -= by_slope * self.slope[i] / z;
+                let grad_slope = -grad_last * focal[i] / z;
+                grad_x[i] += grad_slope / z;
+                grad_x.z -= grad_slope * self.slope[i] / z;
             }
         }
-        by_x
+        grad_x
     }
 
-    fn by_quaternion(&self, by_orientation: &Matrix3<f64>) -> [f64; 4] {
-        let g = by_orientation;
+    fn grad_quaternion(&self, grad_orientation: &Matrix3<f64>) -> [f64; 4] {
+        let g = grad_orientation;
         let [w, x, y, z] = self.quaternion.into();
-        let by_unit = 2.0
+        let grad_unit = 2.0
             * Vector4::new(
                 x * (g.m32 - g.m23) + y * (g.m13 - g.m31) + z * (g.m21 - g.m12),
                 w * (g.m32 - g.m23) + y * (g.m12 + g.m21) + z * (g.m13 + g.m31) - 2.0 * x * (g.m22 + g.m33),
                 w * (g.m13 - g.m31) + x * (g.m12 + g.m21) + z * (g.m23 + g.m32) - 2.0 * y * (g.m11 + g.m33),
                 w * (g.m21 - g.m12) + x * (g.m13 + g.m31) + y * (g.m23 + g.m32) - 2.0 * z * (g.m11 + g.m22),
             );
-        let radial = self.quaternion.dot(&by_unit);
-        ((by_unit - self.quaternion * radial) / self.quaternion_norm).into()
+        let radial = self.quaternion.dot(&grad_unit);
+        ((grad_unit - self.quaternion * radial) / self.quaternion_norm).into()
     }
 }
 

@@ -43,30 +43,30 @@ pub fn render(gaussians: &[ReferenceGaussian], view: &RasterView, cutoff: Cutoff
     image
 }
 
-/// Gradients of a loss whose gradient by the rendered pixels is `by_pixels`; it has the size of the view.
+/// Gradients of a loss whose gradient by the rendered pixels is `grad_pixels`; it has the size of the view.
 #[must_use]
 pub fn gradients(
     gaussians: &[ReferenceGaussian],
     view: &RasterView,
-    by_pixels: &ReferencePixelGradient,
+    grad_pixels: &ReferencePixelGradient,
     cutoff: Cutoff,
 ) -> ReferenceGradients {
     let sorted = Sorted::new(gaussians, view);
     let background = background(view);
-    let mut by_splat = vec![SplatGradient::default(); sorted.splats.len()];
+    let mut grad_splat = vec![SplatGradient::default(); sorted.splats.len()];
     for_each_pixel(&sorted, view, cutoff, |index, pixel| {
-        let by_pixel = PixelGradient {
-            colour: by_pixels.colour[index],
-            depth: by_pixels.depth[index],
-            alpha: by_pixels.alpha[index],
+        let grad_pixel = PixelGradient {
+            colour: grad_pixels.colour[index],
+            depth: grad_pixels.depth[index],
+            alpha: grad_pixels.alpha[index],
         };
-        pixel.backward(&sorted.splats, &background, &by_pixel, &mut by_splat);
+        pixel.backward(&sorted.splats, &background, &grad_pixel, &mut grad_splat);
     });
     let mut result = ReferenceGradients {
         gaussians: vec![ReferenceGradient::default(); gaussians.len()],
         ..ReferenceGradients::default()
     };
-    for (&index, splat) in sorted.gaussian_from_rank.iter().zip(&by_splat) {
+    for (&index, splat) in sorted.gaussian_from_rank.iter().zip(&grad_splat) {
         result.gaussians[index] = project_backward(&gaussians[index], view, splat, &mut result.view);
     }
     result

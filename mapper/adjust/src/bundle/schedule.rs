@@ -114,7 +114,11 @@ const LENGTHS: StepLengths =
 const LOG_GAIN: f64 = 2e-3;
 /// Weights of the terms of the loss of Gaussians. Colour is the unit, and similarity counts a fifth, as in 3DGS. An error of
 /// inverse depth of 0.01/m counts as 0.02 of full scale. Alpha only keeps surfaces from fading.
-const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, alpha: 0.01 };
+const WEIGHTS: LossWeights =
+    LossWeights { colour: 1.0, similarity: 0.2, depth: 2.0, depth_noise: 0.004, opaque: 0.9, alpha: 0.01 };
+/// The same while the map grows: poses at mid exposure rest, so that depth may pull as hard as its own noise allows, 1.5 mm at
+/// 1 m, and as soon as anything shows. Later it would pull poses to the noise of single frames.
+const GROWING_WEIGHTS: LossWeights = LossWeights { depth: 6.0, depth_noise: 0.0015, opaque: 0.5, ..WEIGHTS };
 
 impl Schedule {
     /// The schedule for a map of some kind.
@@ -174,7 +178,7 @@ impl Schedule {
             path_pixels: FINISH.path_pixels * paths,
             only_motions: true,
             log_gain: LOG_GAIN * paths,
-            weights: WEIGHTS,
+            weights: GROWING_WEIGHTS,
         }
     }
 

@@ -17,18 +17,17 @@ pub struct LossWeights {
     pub similarity: f32,
     /// Of the mean absolute difference of inverse depths, metres.
     pub depth: f32,
+    /// Differences of inverse depth below this count quadratically, 1/metre.
+    pub depth_noise: f32,
+    /// Depth is compared where the map hides at least this share of what is behind it: elsewhere what shines through has a
+    /// depth too.
+    pub opaque: f32,
     /// Of the mean transparency where a depth was measured.
     pub alpha: f32,
 }
 
 /// Differences of display values below this count quadratically, 1 is full scale: about the noise of a camera.
 pub const NOISE: f32 = 0.01;
-
-/// Differences of inverse depth below this count quadratically, 1/metre.
-const DEPTH_NOISE: f32 = 0.004;
-
-/// Depth is compared where the map is opaque to this degree: elsewhere what shines through has a depth too.
-const OPAQUE: f32 = 0.9;
 
 /// Light of stored values this bright may have been clipped; more light is no error.
 pub const CLIPPED: u8 = 254;
@@ -215,12 +214,12 @@ pub fn compare_depth(
             }
             sum += weights.alpha * share * (1.0 - alpha[x]);
             grad_alpha[x] = -weights.alpha * share;
-            if alpha[x] < OPAQUE || depth[x] < 0.1 * alpha[x] {
+            if alpha[x] < weights.opaque || depth[x] < 0.1 * alpha[x] {
                 continue;
             }
             // Inverse depth A/D: the noise of sensors is uniform there.
             let inverse = alpha[x] / depth[x];
-            let (loss, grad_inverse) = smooth_absolute(inverse - 1.0 / measured[x], DEPTH_NOISE);
+            let (loss, grad_inverse) = smooth_absolute(inverse - 1.0 / measured[x], weights.depth_noise);
             let scale = weights.depth * share;
             sum += scale * loss;
             grad_depth[x] = -scale * grad_inverse * inverse / depth[x];
@@ -252,7 +251,8 @@ mod tests {
     use crate::exposure::RowTimes;
 
     const SIZE: [usize; 2] = [6, 5];
-    const WEIGHTS: LossWeights = LossWeights { colour: 1.0, similarity: 0.0, depth: 3.0, alpha: 0.2 };
+    const WEIGHTS: LossWeights =
+        LossWeights { colour: 1.0, similarity: 0.0, depth: 3.0, depth_noise: 0.004, opaque: 0.9, alpha: 0.2 };
 
     fn fraction(i: usize) -> f32 {
         ((i * 7919 + 17) % 101) as f32 / 101.0

@@ -95,7 +95,10 @@ fn views_have_colour_and_depth_where_the_map_is() {
                 assert!(f32::from(*found) <= expected + 1.0 && f32::from(*found) > 0.98 * expected - 1.0);
             }
             let Luma([millimetres]) = *depth(frame).get_pixel(pixel.x, pixel.y);
-            assert!((f64::from(millimetres) - 1000.0 * in_camera.z).abs() < 1.0);
+            // A ball is densest where the ray of the pixel passes its centre.
+            let ray = camera().pinhole().ray(f64::from(pixel.x), f64::from(pixel.y));
+            let depth_of_peak = ray.dot(&in_camera) / ray.norm_squared();
+            assert!((f64::from(millimetres) - 1000.0 * depth_of_peak).abs() < 1.0);
         }
         assert_eq!((view.get_pixel(80, 0), depth(frame).get_pixel(80, 0)), (&Rgb([0; 3]), &Luma([0])));
         solid += depth(frame).pixels().filter(|depth| depth.0[0] > 0).count();

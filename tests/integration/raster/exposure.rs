@@ -282,15 +282,13 @@ fn only_what_is_drawn_in_a_view_gets_gradients() {
 }
 
 #[test]
-fn images_of_another_size_give_no_gradient() {
+#[should_panic(expected = "the size of the exposure that was rendered before")]
+fn images_of_another_size_are_refused() {
     let scene = Scene::new(7, [60, 40], 20);
     let renderer = ExposureRenderer::new(Level::new());
     let (mut scratch, mut image) = (ExposureScratch::default(), RasterImage::default());
     let RasterView { camera, background, .. } = &scene.view;
     renderer.forward(&scene.gaussians, camera, &scene.path, 3, *background, &mut scratch, &mut image);
     let mut gradients = GaussianGradients::zeros(20);
-    let grad_path =
-        renderer.backward(&scene.gaussians, &RasterImage::zeros(40, 60), &mut scratch, &mut gradients);
-    assert_eq!(gradients, GaussianGradients::zeros(20));
-    assert_eq!(grad_path.norm(), 0.0);
+    renderer.backward(&scene.gaussians, &RasterImage::zeros(40, 60), &mut scratch, &mut gradients);
 }

@@ -148,7 +148,7 @@ mod tests {
     fn a_measured_response_survives_the_file() {
         let table: Vec<f32> = (0..256).map(|k| ((k * k + k) as f32).sqrt() / 255.5).collect();
         let camera =
-            RunCamera { response: RunResponse::Table(table), fx: 0.1 + 0.2, ..RunCamera::simple(8, 6, 5.0) };
+            RunCamera { response: RunResponse::Table(table), fx: 1.1 + 2.2, ..RunCamera::simple(8, 6, 5.0) };
         let json = serde_json::to_string(&camera).unwrap();
         assert_eq!(serde_json::from_str::<RunCamera>(&json).unwrap(), camera);
         assert!(camera.check().is_ok());

@@ -320,7 +320,7 @@ mod tests {
 
     fn settings() -> RunSettings {
         let options = serde_json::Map::from_iter([("virtual_views".to_owned(), 8.into())]);
-        let camera = Some(RunCamera::simple(640, 480, 1.0 / 3.0));
+        let camera = Some(RunCamera::simple(640, 480, 1000.0 / 3.0));
         RunSettings { program: "mba test".into(), dataset: "data".into(), frame_rate: 30.0, camera, options }
     }
 

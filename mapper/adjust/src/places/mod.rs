@@ -6,8 +6,8 @@
 //! other. A candidate is a hint, to be checked by alignment.
 //!
 //! ```
-//! use mba_mapper::places::{PlaceDescriptor, PlaceIndex};
-//! use mba_mapper::synth::{SynthConfig, SynthSequence};
+//! use mba_adjust::places::{PlaceDescriptor, PlaceIndex};
+//! use mba_synth::{SynthConfig, SynthSequence};
 //!
 //! let config = SynthConfig { width: 160, height: 120, frames: 2, mean_blur_px: 1.0, ..SynthConfig::default() };
 //! let sequence = SynthSequence::new(config)?;

@@ -9,7 +9,7 @@
 //! that disturbs the others less than its rejection costs.
 //!
 //! ```
-//! use mba_mapper::pose_graph::{PoseGraph, PoseGraphEdge, PoseGraphSettings};
+//! use mba_adjust::pose_graph::{PoseGraph, PoseGraphEdge, PoseGraphSettings};
 //! use mba_tracker::geometry::RigidTransform;
 //! use nalgebra::Vector3;
 //!
@@ -24,7 +24,7 @@
 //! graph.optimise(&PoseGraphSettings::default())?;
 //! // Three edges of equal weight share 3 cm.
 //! assert!((graph.world_from_keyframe[2].translation.x - 2.02).abs() < 1e-6);
-//! # Ok::<(), mba_mapper::pose_graph::PoseGraphError>(())
+//! # Ok::<(), mba_adjust::pose_graph::PoseGraphError>(())
 //! ```
 
 mod edge;

@@ -2,18 +2,14 @@
 
 use core::fmt;
 
+use crate::image::ExtentError;
 use crate::workspace::WorkspaceError;
 
 /// Why a frame cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum FrameError {
     /// A buffer is too short for its size and stride.
-    Buffer {
-        /// Values needed.
-        needed: usize,
-        /// Values present.
-        got: usize,
-    },
+    Buffer(ExtentError),
     /// An image does not have the size of the configuration.
     Size {
         /// Configured columns and rows.
@@ -47,7 +43,7 @@ pub enum FrameError {
 impl fmt::Display for FrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Buffer { needed, got } => write!(f, "image buffer holds {got} values, {needed} are needed"),
+            Self::Buffer(error) => error.fmt(f),
             Self::Size { expected, got } => {
                 write!(f, "image is {}x{}, the calibration says {}x{}", got.0, got.1, expected.0, expected.1)
             }
@@ -64,6 +60,12 @@ impl fmt::Display for FrameError {
 }
 
 impl core::error::Error for FrameError {}
+
+impl From<ExtentError> for FrameError {
+    fn from(error: ExtentError) -> Self {
+        Self::Buffer(error)
+    }
+}
 
 /// Why a tracker cannot be built.
 #[derive(Clone, Copy, Debug, PartialEq)]

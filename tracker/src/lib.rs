@@ -17,7 +17,8 @@
 //! # Layers
 //!
 //! A module uses only those to its left: [`math`], [`geometry`], [`trajectory`], [`photometric`], [`image`],
-//! [`surface`], [`transfer`], [`keyframe`], [`deblur`], [`align`], [`Tracker`].
+//! [`surface`], [`transfer`], [`keyframe`], [`deblur`], [`align`], [`Tracker`]. Those up to [`transfer`] are a crate of
+//! their own, `mba-imaging`.
 //!
 //! # Use
 //!
@@ -68,19 +69,12 @@ pub mod align;
 pub mod capi;
 pub mod deblur;
 pub mod error;
-pub mod geometry;
-pub mod image;
 pub mod keyframe;
-pub mod math;
-pub mod photometric;
 mod session;
-pub mod simd;
-pub mod surface;
 mod tracker;
-pub mod trajectory;
-pub mod transfer;
 mod work;
-pub mod workspace;
+
+pub use mba_imaging::{geometry, image, math, photometric, simd, surface, trajectory, transfer, workspace};
 
 /// Instruction sets that the kernels can run on; chosen once, at construction.
 pub use fearless_simd::Level as SimdLevel;

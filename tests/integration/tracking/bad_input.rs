@@ -3,7 +3,7 @@
 use mba_tests::handheld::{camera_of_width, track_all, track_anew, tracker_config, workspace};
 use mba_tracker::error::{ConfigError, FrameError};
 use mba_tracker::geometry::RigidTransform;
-use mba_tracker::image::{ColourView, DepthView, PixelFormat, PixelRectangle};
+use mba_tracker::image::{ColourView, DepthView, ExtentError, PixelFormat, PixelRectangle};
 use mba_tracker::{Frame, ReferenceView, SimdLevel, Tracker, TrackerConfig};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
@@ -59,7 +59,7 @@ fn buffers_that_are_too_short_are_refused() {
     let data = [0u8; 100];
     let colour = |w, h, stride, format| ColourView::new(&data, w, h, stride, format).map(|_| ());
     assert_eq!(colour(10, 10, 10, PixelFormat::Grey8), Ok(()));
-    assert_eq!(colour(4, 9, 12, PixelFormat::Rgb8), Err(FrameError::Buffer { needed: 108, got: 100 }));
+    assert_eq!(colour(4, 9, 12, PixelFormat::Rgb8), Err(ExtentError { needed: 108, got: 100 }));
     assert_eq!(colour(4, 8, 12, PixelFormat::Rgb8), Ok(()));
     assert!(colour(5, 2, 14, PixelFormat::Rgb8).is_err(), "stride shorter than a row");
     assert!(colour(10, usize::MAX, 10, PixelFormat::Grey8).is_err(), "size overflows");

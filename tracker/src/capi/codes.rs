@@ -99,7 +99,7 @@ pub(super) const fn as_c(text: &'static CStr) -> *const c_char {
 
 pub(super) fn code_of_frame(error: FrameError) -> i32 {
     match error {
-        FrameError::Buffer { .. } => MBA_ERROR_SHORT_BUFFER,
+        FrameError::Buffer(_) => MBA_ERROR_SHORT_BUFFER,
         FrameError::Size { .. } => MBA_ERROR_IMAGE_SIZE,
         FrameError::Timestamp { .. } => MBA_ERROR_TIMESTAMP,
         FrameError::DepthTimestamp { .. } => MBA_ERROR_DEPTH_TIMESTAMP,

@@ -110,7 +110,8 @@ pub(super) unsafe fn colour<'a>(image: &MbaImage) -> Result<ColourView<'a>, i32>
     }
     // SAFETY: passed on from the caller.
     let data = unsafe { read_slice(image.data, image.size_bytes) }?;
-    ColourView::new(data, width, image.height as usize, stride, format).map_err(code_of_frame)
+    ColourView::new(data, width, image.height as usize, stride, format)
+        .map_err(|error| code_of_frame(error.into()))
 }
 
 /// A depth image of C.
@@ -124,7 +125,8 @@ pub(super) unsafe fn depth<'a>(image: &MbaDepth) -> Result<DepthView<'a>, i32> {
     }
     // SAFETY: passed on from the caller.
     let data = unsafe { read_slice(image.data, image.size_bytes) }?;
-    DepthView::new(data, width, image.height as usize, stride / 2).map_err(code_of_frame)
+    DepthView::new(data, width, image.height as usize, stride / 2)
+        .map_err(|error| code_of_frame(error.into()))
 }
 
 /// A frame of C.

@@ -3,9 +3,8 @@
 use mba_io::dataset::{FrameError, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::deblur::DeblurScratch;
-use mba_tracker::error::FrameError as ImageError;
 use mba_tracker::geometry::PinholeCamera;
-use mba_tracker::image::{DepthView, PixelRectangle};
+use mba_tracker::image::{DepthView, ExtentError, PixelRectangle};
 use mba_tracker::keyframe::RectifyScratch;
 use mba_tracker::photometric::InverseResponse;
 use mba_tracker::surface::{InverseDepthMap, SurfacePlanes};
@@ -44,7 +43,7 @@ pub enum DeblurError {
     },
     /// One of the frame's buffers is shorter than its size asks for.
     #[error(transparent)]
-    Buffer(#[from] ImageError),
+    Buffer(#[from] ExtentError),
     /// The memory is that of a deblurrer for smaller images.
     #[error(transparent)]
     Memory(#[from] WorkspaceError),
@@ -173,7 +172,7 @@ impl KeyframeDeblurrer {
         }
         let needed = 3 * frame.width * frame.height;
         if frame.rgb.len() < needed {
-            return Err(ImageError::Buffer { needed, got: frame.rgb.len() }.into());
+            return Err(ExtentError { needed, got: frame.rgb.len() }.into());
         }
         Ok(())
     }

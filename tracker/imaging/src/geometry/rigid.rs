@@ -37,12 +37,14 @@ impl RigidTransform {
 
     /// R as a matrix.
     #[must_use]
+    #[inline]
     pub fn rotation_matrix(&self) -> Matrix3<f64> {
         self.rotation.to_rotation_matrix().into_inner()
     }
 
     /// `b_from_a` of an `a_from_b`.
     #[must_use]
+    #[inline]
     pub fn inverse(&self) -> Self {
         let rotation = self.rotation.inverse();
         Self { rotation, translation: -(rotation * self.translation) }
@@ -50,6 +52,7 @@ impl RigidTransform {
 
     /// `a_from_c` of `a_from_b` (self) and `b_from_c`.
     #[must_use]
+    #[inline]
     pub fn compose(&self, b_from_c: &Self) -> Self {
         Self {
             rotation: self.rotation * b_from_c.rotation,
@@ -59,6 +62,7 @@ impl RigidTransform {
 
     /// Maps a point of frame b into frame a.
     #[must_use]
+    #[inline]
     pub fn transform_point(&self, x_b: &Vector3<f64>) -> Vector3<f64> {
         self.rotation * x_b + self.translation
     }

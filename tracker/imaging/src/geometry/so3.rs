@@ -44,6 +44,7 @@ pub fn cosine_deficit(x: f64) -> f64 {
 
 /// The matrix `[a]x` with `[a]x b = a x b`.
 #[must_use]
+#[inline]
 pub fn hat(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)
 }

@@ -36,6 +36,7 @@ pub struct GreyLevel<'m> {
 impl GreyLevel<'_> {
     /// The level as the kernels read it.
     #[must_use]
+    #[inline]
     pub fn image(&self) -> LevelImage<'_> {
         LevelImage { pixels: self.pixels, width: self.width, height: self.height }
     }

@@ -74,6 +74,7 @@ impl<'m> InverseDepthMap<'m> {
 
     /// Mean of the measured values, 1/m; `None` if there is none.
     #[must_use]
+    #[inline]
     pub fn mean(&self) -> Option<f32> {
         let (sum, count) = self
             .values

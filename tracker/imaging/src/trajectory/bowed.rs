@@ -116,6 +116,7 @@ impl FrameTiming {
 
     /// Whether the rows of the colour image are exposed one after the other.
     #[must_use]
+    #[inline]
     pub fn is_rolling(&self) -> bool {
         self.readout != 0.0
     }
@@ -128,12 +129,14 @@ impl FrameTiming {
 
     /// Normalised time `s` of the middle of the exposure of row `v` (may be fractional) of `height`.
     #[must_use]
+    #[inline]
     pub fn row_time(&self, v: f64, height: usize) -> f64 {
         0.5 + self.readout * row_share(v, height)
     }
 
     /// Normalised time `s` of row `v` of `height` of the depth map.
     #[must_use]
+    #[inline]
     pub fn depth_row_time(&self, v: f64, height: usize) -> f64 {
         0.5 + self.depth_time + self.depth_readout * row_share(v, height)
     }

@@ -51,7 +51,7 @@ impl<'m> Arena<'m> {
 /// Why the caller's memory cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkspaceError {
-    /// The buffer is shorter than [`crate::workspace_len`] says.
+    /// The buffer is shorter than what is taken from it.
     TooSmall {
         /// Bytes missing for the slice that did not fit.
         missing: usize,

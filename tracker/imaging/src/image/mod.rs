@@ -5,10 +5,10 @@ mod pyramid;
 mod undistort;
 mod view;
 
-pub(crate) use bilinear::{BilinearSampler, Cell, Sampled};
+pub use bilinear::{BilinearSampler, Cell, Sampled};
 pub use pyramid::{GreyLevel, GreyPyramid, LevelImage, MAX_LEVELS};
 pub use undistort::{
     BufferSizeError, NO_SOURCE, PixelRectangle, SourcePosition, fill_source_map, region_with_source,
     remap_bilinear, remap_nearest,
 };
-pub use view::{ColourView, DepthView, PixelFormat};
+pub use view::{ColourView, DepthView, ExtentError, PixelFormat};

@@ -54,6 +54,7 @@ impl<const ROW: usize> Default for RowSums<ROW> {
 
 /// Huber cost `rho(r)` and weight `rho'(r)/r` with threshold `delta`.
 #[must_use]
+#[inline]
 pub fn huber(r: f32, delta: f32) -> (f32, f32) {
     let magnitude = r.abs();
     if magnitude <= delta {

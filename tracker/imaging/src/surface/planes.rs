@@ -96,6 +96,7 @@ impl<'m> SurfacePlanes<'m> {
 
     /// Inverse depth of the plane nearest to `(u, v)`, continued to that point; `None` where there is none.
     #[must_use]
+    #[inline]
     pub fn inverse_depth(&self, u: f32, v: f32) -> Option<f32> {
         let inside = u >= -0.5 && v >= -0.5 && u < self.width as f32 - 0.5 && v < self.height as f32 - 0.5;
         if !inside {

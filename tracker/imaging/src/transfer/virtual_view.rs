@@ -129,6 +129,7 @@ impl RowBand {
 
     /// The row in the middle; may lie between two.
     #[must_use]
+    #[inline]
     pub fn centre(&self) -> f64 {
         0.5 * (self.first + self.end) as f64 - 0.5
     }

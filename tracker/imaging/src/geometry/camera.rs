@@ -44,12 +44,14 @@ impl PinholeCamera {
 
     /// The ray through pixel `(u, v)`, scaled to unit z.
     #[must_use]
+    #[inline]
     pub fn ray(&self, u: f64, v: f64) -> Vector3<f64> {
         Vector3::new((u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0)
     }
 
     /// The pixel of a point in camera coordinates; meaningful for positive z only.
     #[must_use]
+    #[inline]
     pub fn project(&self, x_camera: &Vector3<f64>) -> Vector2<f64> {
         Vector2::new(self.fx * x_camera.x / x_camera.z + self.cx, self.fy * x_camera.y / x_camera.z + self.cy)
     }
@@ -73,6 +75,7 @@ pub struct Distortion {
 impl Distortion {
     /// Where the lens images the ideal point `(x, y)` at unit depth.
     #[must_use]
+    #[inline]
     pub fn distort(&self, x: f64, y: f64) -> (f64, f64) {
         let r2 = x * x + y * y;
         let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
@@ -84,6 +87,7 @@ impl Distortion {
 
     /// Whether all coefficients are zero.
     #[must_use]
+    #[inline]
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

@@ -160,6 +160,7 @@ impl PixelRectangle {
 
     /// Whether pixel `(u, v)` lies in the rectangle.
     #[must_use]
+    #[inline]
     pub fn contains(&self, u: i32, v: i32) -> bool {
         u >= self.left as i32 && v >= self.top as i32 && u < self.right as i32 && v < self.bottom as i32
     }

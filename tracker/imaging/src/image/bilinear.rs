@@ -7,11 +7,11 @@ use super::LevelImage;
 /// Largest image: linear indices are computed in f32, where whole numbers are exact up to here.
 const MAX_PIXELS: usize = 1 << 24;
 
-/// Interpolates one image; splatted constants are kept beside it.
+/// Interpolates one image, on the instruction set `S`; splatted constants are kept beside it.
 ///
 /// Four neighbours are read as two pairs of adjacent floats, one 64-bit load each. The bounds check per pair was
 /// measured to cost nothing: reading without it was not faster.
-pub(crate) struct BilinearSampler<'a, S: Simd> {
+pub struct BilinearSampler<'a, S: Simd> {
     simd: S,
     /// All rows but the last, and all rows but the first: an index into one is the cell above or below.
     top: &'a [f32],
@@ -25,7 +25,7 @@ pub(crate) struct BilinearSampler<'a, S: Simd> {
 
 /// Where a sample lies: the linear index of its top left pixel and the position between the four.
 #[derive(Clone, Copy)]
-pub(crate) struct Cell<S: Simd> {
+pub struct Cell<S: Simd> {
     index: S::i32s,
     fraction_u: S::f32s,
     fraction_v: S::f32s,
@@ -34,23 +34,26 @@ pub(crate) struct Cell<S: Simd> {
 impl<S: Simd> Cell<S> {
     /// The first cell of any image.
     #[inline(always)]
-    pub(crate) fn first(simd: S) -> Self {
+    pub fn first(simd: S) -> Self {
         let zero = S::f32s::splat(simd, 0.0);
         Self { index: S::i32s::splat(simd, 0), fraction_u: zero, fraction_v: zero }
     }
 }
 
 /// Interpolated intensities and, per pixel of displacement, their derivatives.
-pub(crate) struct Sampled<S: Simd> {
-    pub(crate) value: S::f32s,
-    pub(crate) gradient_u: S::f32s,
-    pub(crate) gradient_v: S::f32s,
+pub struct Sampled<S: Simd> {
+    /// Intensities.
+    pub value: S::f32s,
+    /// Derivatives along a row.
+    pub gradient_u: S::f32s,
+    /// Derivatives along a column.
+    pub gradient_v: S::f32s,
 }
 
 impl<'a, S: Simd> BilinearSampler<'a, S> {
     /// `None` if the image is narrower than one cell, larger than 2^24 pixels or shorter than it claims.
     #[inline(always)]
-    pub(crate) fn new(simd: S, image: &LevelImage<'a>) -> Option<Self> {
+    pub fn new(simd: S, image: &LevelImage<'a>) -> Option<Self> {
         let (width, height) = (image.width, image.height);
         let count = width.checked_mul(height).filter(|&count| count <= MAX_PIXELS)?;
         let pixels = image.pixels.get(..count)?;
@@ -74,13 +77,13 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
 
     /// Lanes within `[0, W-1] x [0, H-1]`; false for NaN.
     #[inline(always)]
-    pub(crate) fn contains(&self, u: S::f32s, v: S::f32s) -> S::mask32s {
+    pub fn contains(&self, u: S::f32s, v: S::f32s) -> S::mask32s {
         (u.simd_ge(0.0) & u.simd_le(self.last_u)) & (v.simd_ge(0.0) & v.simd_le(self.last_v))
     }
 
     /// The cell that holds `(u, v)`; lanes outside the image get some cell of it.
     #[inline(always)]
-    pub(crate) fn locate(&self, u: S::f32s, v: S::f32s) -> Cell<S> {
+    pub fn locate(&self, u: S::f32s, v: S::f32s) -> Cell<S> {
         // Truncation is floor for valid lanes. Clamping after it makes the cell valid whatever the lane holds.
         let cell_u = truncate::<S>(u).max(0.0).min(self.last_cell_u);
         let cell_v = truncate::<S>(v).max(0.0).min(self.last_cell_v);
@@ -90,7 +93,7 @@ impl<'a, S: Simd> BilinearSampler<'a, S> {
 
     /// Interpolates within a cell. Lanes outside the image return something unspecified, possibly NaN.
     #[inline(always)]
-    pub(crate) fn sample(&self, cell: &Cell<S>) -> Sampled<S> {
+    pub fn sample(&self, cell: &Cell<S>) -> Sampled<S> {
         // Says to the compiler that the lengths are equal: what is in bounds of one is in bounds of the other.
         let bottom = &self.bottom[..self.top.len()];
         let (i00, i01) = self.pairs(self.top, &cell.index);

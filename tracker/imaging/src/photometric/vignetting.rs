@@ -16,18 +16,21 @@ impl Vignetting {
 
     /// Whether the light is the same everywhere.
     #[must_use]
+    #[inline]
     pub fn is_none(&self) -> bool {
         *self == Self::NONE
     }
 
     /// Share of the light at a squared distance from the middle, 1 in the corner.
     #[must_use]
+    #[inline]
     pub fn falloff(&self, radius_squared: f64) -> f64 {
         1.0 + radius_squared * (self.a2 + radius_squared * self.a4)
     }
 
     /// Share of the light at pixel `(u, v)` of an image of this size; pixel centres are at whole numbers.
     #[must_use]
+    #[inline]
     pub fn falloff_at(&self, width: usize, height: usize, u: f64, v: f64) -> f64 {
         self.falloff(radius_squared(width, height, u, v))
     }
@@ -61,6 +64,7 @@ impl Vignetting {
 
 /// Squared distance of pixel `(u, v)` from the middle of an image, 1 at the centre of a corner pixel.
 #[must_use]
+#[inline]
 pub fn radius_squared(width: usize, height: usize, u: f64, v: f64) -> f64 {
     let (centre_u, centre_v) = (0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0));
     let corner = centre_u * centre_u + centre_v * centre_v;

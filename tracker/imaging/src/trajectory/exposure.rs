@@ -29,6 +29,7 @@ pub enum SampleRule {
 impl SampleRule {
     /// Normalised time of virtual view `k` of `n`; a single view is at mid exposure for either rule.
     #[must_use]
+    #[inline]
     pub fn time(self, k: usize, n: usize) -> f64 {
         match self {
             _ if n <= 1 => 0.5,

@@ -1,6 +1,23 @@
 //! Borrowed input images with a row stride.
 
-use crate::error::FrameError;
+use core::fmt;
+
+/// A buffer is too short for the size and stride of its image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExtentError {
+    /// Values needed.
+    pub needed: usize,
+    /// Values present.
+    pub got: usize,
+}
+
+impl fmt::Display for ExtentError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "image buffer holds {} values, {} are needed", self.got, self.needed)
+    }
+}
+
+impl core::error::Error for ExtentError {}
 
 /// Layout of a colour pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,6 +31,7 @@ pub enum PixelFormat {
 impl PixelFormat {
     /// Bytes per pixel.
     #[must_use]
+    #[inline]
     pub const fn bytes(self) -> usize {
         match self {
             Self::Grey8 => 1,
@@ -36,14 +54,14 @@ impl<'a> ColourView<'a> {
     /// A view of `height` rows that start `stride` bytes apart.
     ///
     /// # Errors
-    /// [`FrameError::Buffer`] when a row is longer than the stride or the last row is not complete.
+    /// [`ExtentError`] when a row is longer than the stride or the last row is not complete.
     pub fn new(
         data: &'a [u8],
         width: usize,
         height: usize,
         stride: usize,
         format: PixelFormat,
-    ) -> Result<Self, FrameError> {
+    ) -> Result<Self, ExtentError> {
         let row = width.saturating_mul(format.bytes());
         check_extent(data.len(), row, height, stride)?;
         Ok(Self { data, width, height, stride, format })
@@ -51,18 +69,21 @@ impl<'a> ColourView<'a> {
 
     /// Columns and rows.
     #[must_use]
+    #[inline]
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
     /// Layout of a pixel.
     #[must_use]
+    #[inline]
     pub fn format(&self) -> PixelFormat {
         self.format
     }
 
     /// The bytes of row `v`.
     #[must_use]
+    #[inline]
     pub fn row(&self, v: usize) -> &'a [u8] {
         &self.data[v * self.stride..][..self.width * self.format.bytes()]
     }
@@ -81,32 +102,34 @@ impl<'a> DepthView<'a> {
     /// A view of `height` rows that start `stride` values apart.
     ///
     /// # Errors
-    /// [`FrameError::Buffer`] when a row is longer than the stride or the last row is not complete.
-    pub fn new(data: &'a [u16], width: usize, height: usize, stride: usize) -> Result<Self, FrameError> {
+    /// [`ExtentError`] when a row is longer than the stride or the last row is not complete.
+    pub fn new(data: &'a [u16], width: usize, height: usize, stride: usize) -> Result<Self, ExtentError> {
         check_extent(data.len(), width, height, stride)?;
         Ok(Self { data, width, height, stride })
     }
 
     /// Columns and rows.
     #[must_use]
+    #[inline]
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
     /// The raw values of row `v`.
     #[must_use]
+    #[inline]
     pub fn row(&self, v: usize) -> &'a [u16] {
         &self.data[v * self.stride..][..self.width]
     }
 }
 
-fn check_extent(len: usize, row: usize, height: usize, stride: usize) -> Result<(), FrameError> {
+fn check_extent(len: usize, row: usize, height: usize, stride: usize) -> Result<(), ExtentError> {
     let needed = match height {
         0 => 0,
         _ => (height - 1).saturating_mul(stride).saturating_add(row),
     };
     if row > stride || len < needed {
-        return Err(FrameError::Buffer { needed: needed.max(row), got: len });
+        return Err(ExtentError { needed: needed.max(row), got: len });
     }
     Ok(())
 }

@@ -89,6 +89,44 @@ fn a_sheared_keyframe_and_the_error_of_its_path_are_restored() {
     }
 }
 
+/// Asserts that a tracker that has seen other frames and was reset does the same as a new one.
+fn assert_starts_anew(
+    config: &TrackerConfig,
+    before: &[RenderedFrame],
+    frames: &[RenderedFrame],
+    gyro: bool,
+) {
+    let mut memory = [workspace(config), vec![0xC9; config.workspace_len()]];
+    let [fresh, used] = &mut memory;
+    let mut fresh = tracker_anew(config, fresh);
+    let mut used = tracker_anew(config, used);
+    track(&mut used, before);
+    used.reset();
+    assert!(saved(&mut used) == saved(&mut fresh), "something outlives a reset");
+    let seen = |frame| if gyro { view(frame) } else { Frame { gyro: None, ..view(frame) } };
+    for (k, frame) in frames.iter().enumerate() {
+        let [expected, found] = [&mut fresh, &mut used].map(|tracker| tracker.track(&seen(frame)));
+        assert_eq!(format!("{found:?}"), format!("{expected:?}"), "frame {k}");
+    }
+    assert!(saved(&mut used) == saved(&mut fresh), "results are the same, but not what is remembered");
+}
+
+#[test]
+fn a_reset_tracker_is_a_new_one_bit_for_bit() {
+    let camera = camera_of_width(160);
+    let rolling = Readout { colour: 0.024, depth: 0.01, depth_apart: true, ..Readout::GLOBAL };
+    let rows: Vec<_> = (0..10).map(|k| rolling_frame(&camera, 0.4 + k as f64 / 30.0)).collect();
+    for (readout, frames) in [(Readout::GLOBAL, &SMALL[..10]), (rolling, &rows[..])] {
+        for gyro in [false, true] {
+            let config = TrackerConfig { readout, ..tracker_config(camera) };
+            assert_starts_anew(&config, &away_and_back(), frames, gyro);
+            // The frame after which it is reset is the first, and one that is lost.
+            assert_starts_anew(&config, &SMALL[..1], frames, gyro);
+            assert_starts_anew(&config, &[SMALL[0].clone(), SMALL[1].clone(), elsewhere(2)], frames, gyro);
+        }
+    }
+}
+
 #[test]
 fn what_is_no_session_is_refused_and_the_tracker_begins_anew() {
     let config = tracker_config(camera_of_width(160));

@@ -76,6 +76,11 @@ impl<'m> DeblurScratch<'m> {
         }
     }
 
+    /// Forgets the image as captured.
+    pub(crate) fn forget(&mut self) {
+        self.captured.fill(0.0);
+    }
+
     /// Visits the image as captured; all else serves within a call.
     pub(crate) fn walk(&mut self, walk: &mut Walk<'_>) {
         walk.values(self.captured);

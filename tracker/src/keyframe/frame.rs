@@ -213,7 +213,7 @@ impl<'m> Keyframe<'m> {
         walk.count(&mut self.frame_index);
     }
 
-    /// Leaves a keyframe that shows nothing, whatever it held.
+    /// Leaves a keyframe that shows nothing, as when it was made.
     pub(crate) fn forget(&mut self) {
         self.counts = [0; MAX_LEVELS];
         self.fusions = 0;
@@ -224,6 +224,8 @@ impl<'m> Keyframe<'m> {
         self.world_from_keyframe = RigidTransform::identity();
         self.keyframe_from_camera = None;
         self.timing = FrameTiming::GLOBAL;
+        self.blur = f32::MAX;
+        self.frame_index = 0;
     }
 
     /// Whether a keyframe that was restored can be worked with.

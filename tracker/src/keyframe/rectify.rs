@@ -92,6 +92,12 @@ impl<'m> RectifyScratch<'m> {
         }
     }
 
+    /// Forgets the keyframe as it was captured.
+    pub(crate) fn forget(&mut self) {
+        self.image.fill(0.0);
+        self.depth.fill(0.0);
+    }
+
     /// Visits the keyframe as it was captured; shifts serve within a call.
     pub(crate) fn walk(&mut self, walk: &mut Walk<'_>) {
         walk.values(self.image);

@@ -26,6 +26,11 @@ pub(super) struct PathError {
 }
 
 impl PathError {
+    /// Before there is a keyframe, nothing is asked of it.
+    pub(super) fn without_keyframe() -> Self {
+        Self::unknown(&PathRate::repeat(1.0))
+    }
+
     /// Nothing is known but that the error has standard deviation `sigma`.
     pub(super) fn unknown(sigma: &PathRate) -> Self {
         Self { mean: PathRate::zeros(), weight: sigma.map(|sigma| 1.0 / (sigma * sigma)), frames: 0 }

@@ -36,7 +36,6 @@ impl Tracker<'_> {
         });
         if restored.is_err() {
             self.reset();
-            self.keyframe.forget();
         }
         restored
     }

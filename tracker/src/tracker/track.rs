@@ -7,7 +7,7 @@ use super::coarse_to_fine::{Aligned, FrameTask, score};
 use super::config::{ReferenceMode, SCALE_SAMPLES, TrackerConfig};
 use super::frame::{Frame, GyroReading};
 use super::history::Motion;
-use super::keyframe_path::{PathError, PathRate};
+use super::keyframe_path::PathError;
 use super::policy::{Typical, fits_badly, is_blind, wants_keyframe};
 use super::recovery::RecentKeyframes;
 use super::result::{Doubt, FrameResult, FrameStatus, Revision};
@@ -145,7 +145,7 @@ impl<'m> Tracker<'m> {
             late_revision: None,
             established: false,
             lost_at_start: 0,
-            path_error: PathError::unknown(&PathRate::repeat(1.0)),
+            path_error: PathError::without_keyframe(),
             config: config.clone(),
             motion: None,
             brightness: BrightnessModel::default(),
@@ -185,10 +185,16 @@ impl<'m> Tracker<'m> {
         (self.config.camera.width * self.config.camera.height) as u64
     }
 
-    /// Forgets everything but the configuration.
+    /// Forgets everything but the configuration: what follows is that of a new tracker, bit for bit, and so is the session
+    /// that [`Self::save`] gives.
     pub fn reset(&mut self) {
-        self.motion = None;
+        self.keyframe.forget();
         self.recent.clear();
+        self.deblur.forget();
+        self.rectify.forget();
+        self.path_error = PathError::without_keyframe();
+        self.keyframe_span = 0.0;
+        self.motion = None;
         self.brightness = BrightnessModel::default();
         self.typical = Typical::default();
         self.last_timestamp = f64::NEG_INFINITY;

@@ -22,6 +22,7 @@ mod calibration_text;
 mod error;
 mod exposure_list;
 mod frame;
+mod jpeg_scan;
 mod knowledge;
 mod known_cameras;
 mod numbered_images;

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use mba_mapper::dataset::Dataset;
 use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary, write_deblurred_keyframes};
-use mba_mapper::self_calibration::depth_lag;
+use mba_mapper::self_calibration::depth_lag_of_tracked;
 use mba_mapper::tracking::{
     TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config,
 };
@@ -19,10 +19,6 @@ use crate::failure::{OrBadInput, interrupted, is_disk_full};
 use crate::interrupt::{self, Resumption};
 use crate::report::table;
 use crate::written_run::{self, CAMERA_HINT, claim, note_written, or_auto};
-
-/// Contradiction between picture and depth in the median frame above which depth may be that of another frame. Noise alone
-/// gives less than 1, depth that is one frame off 7.
-const CONTRADICTION: f64 = 3.0;
 
 /// Advice when a checkpoint is not fit to go on from.
 const CHECKPOINT_HINT: &str = "start without --resume, or with the data set and options of the stopped run";
@@ -81,9 +77,7 @@ pub fn track_into(
             Err(error).or_bad_input(CHECKPOINT_HINT)?;
         }
         other => {
-            if other? > CONTRADICTION
-                && let Some(lag) = depth_lag(dataset)
-            {
+            if let Some(lag) = depth_lag_of_tracked(dataset, other?) {
                 console.warning(lag.to_string());
                 writer.warn(lag.to_string());
             }

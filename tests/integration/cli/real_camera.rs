@@ -236,12 +236,23 @@ fn depth_that_is_one_frame_late_is_noticed() {
     };
     let (warned, wrong) = track("wrong");
     assert!(warned.contains("warning: depth comes one frame late"), "{warned}");
+    // What maps at the same time says so, too, at its end.
+    let slam = |run: &str, said: &str, is_said: bool| {
+        let [data, run] = [place.path("late"), place.path(run)];
+        let words = ["slam", "--max-gaussians", "1000", "--json", "--out"].map(OsStr::new);
+        let done = mba(words.into_iter().chain([run.as_os_str(), data.as_os_str()]));
+        assert_eq!(done.stderr.contains(said), is_said, "{}", done.stderr);
+        let warnings = done.json()["warnings"].to_string();
+        assert_eq!(warnings.contains(said), is_said, "{warnings}");
+    };
+    slam("wrong-map", "depth comes one frame late", true);
     place.edit("late/calibration.toml", "width", "depth_delay_seconds = -0.0333\nwidth");
     let (silent, right) = track("right");
     assert!(
         !silent.contains("depth comes") && right < 0.4 * wrong,
         "{silent}: {right} m with, {wrong} m without"
     );
+    slam("right-map", "depth comes", false);
 }
 
 #[test]

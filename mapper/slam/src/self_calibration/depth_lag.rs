@@ -24,6 +24,10 @@ const FEWEST_JUMPS: usize = 200;
 const STRONGER: f64 = 1.02;
 const STRONGER_IN_MEAN: f64 = 1.1;
 
+/// Contradiction between picture and depth in the median frame of a tracked recording above which depth may be that of
+/// another frame. Noise alone gives less than 1, depth that is one frame off 7.
+const CONTRADICTION: f64 = 3.0;
+
 /// Share of the frames that have to agree.
 const AGREEING_SHARE: f64 = 0.8;
 
@@ -85,6 +89,13 @@ pub fn depth_lag(dataset: &Dataset) -> Option<DepthLag> {
         [Some(agreeing), None] => Some(found(false, agreeing)),
         _ => None,
     }
+}
+
+/// As [`depth_lag`], once a recording has been tracked: nothing is read where picture and depth agree. `disagreement` is that
+/// of the median frame, as [`track_and_keep`](crate::tracking::track_and_keep) returns it.
+#[must_use]
+pub fn depth_lag_of_tracked(dataset: &Dataset, disagreement: f64) -> Option<DepthLag> {
+    if disagreement > CONTRADICTION { depth_lag(dataset) } else { None }
 }
 
 /// How strong the edges of frame `index` are under the jumps of the depth before and after its own, over those under its

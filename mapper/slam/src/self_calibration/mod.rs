@@ -31,7 +31,7 @@ mod vignetting;
 mod window;
 
 pub use complete::{complete, is_complete};
-pub use depth_lag::{DepthLag, depth_lag};
+pub use depth_lag::{DepthLag, depth_lag, depth_lag_of_tracked};
 pub use finding::{Finding, Value};
 pub use focal::focal_length;
 pub use metre::depth_scale;

@@ -20,6 +20,7 @@ use super::settings::{Arrival, SlamSettings};
 use super::{SlamError, front_end};
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
 use crate::run::{CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
+use crate::self_calibration::depth_lag_of_tracked;
 use crate::tracking::{TrackingError, tracker_config};
 
 /// Tracks and maps `dataset` at the same time into the RUN folder `out`. With `resume`, a run in lock step goes on from the
@@ -102,7 +103,7 @@ impl SlamRun<'_> {
             None => Replay::default(),
         };
         let (tracker_link, mapper_link) = link();
-        thread::scope(|scope| {
+        let disagreement = thread::scope(|scope| {
             let tracking =
                 scope.spawn(|| front_end::run(dataset, config, settings.arrival, tracker_link, replay));
             let mapped = back_end.run(mapper_link, observe);
@@ -112,7 +113,10 @@ impl SlamRun<'_> {
         })?;
         let live_seconds = earlier + started.elapsed().as_secs_f64();
         back_end.find_lost(dataset);
-        let (grown, writer, figures, keeper) = back_end.finish();
+        let (grown, mut writer, figures, keeper) = back_end.finish();
+        if let Some(lag) = depth_lag_of_tracked(dataset, disagreement) {
+            writer.warn(lag.to_string());
+        }
         if grown.bundle.state.map.is_empty() {
             return Err(MapError::NoDepth.into());
         }

@@ -14,6 +14,7 @@ use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink
 use super::saved::Replay;
 use super::settings::Arrival;
 use crate::tracking::{TrackingError, add_gyroscope, held, record, timed, timed_result, tracker_view};
+use crate::uncertainty::Uncertainty;
 
 /// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
 /// tracked.
@@ -29,6 +30,7 @@ struct FrontEnd<'a, 'm> {
     moves: usize,
     /// The last exposure, for frames without one.
     last: Option<TimedExposure>,
+    uncertainty: Uncertainty,
 }
 
 /// The tracker counts the frames it was given, the run those of the data set; only the last few are asked for.
@@ -54,18 +56,26 @@ impl Given {
 }
 
 /// Tracks the data set frame by frame until its end, or until nobody listens any more. Frames that were mapped before are
-/// tracked as they were then.
+/// tracked as they were then. Returns how far picture and depth contradict each other in the median frame.
 pub(super) fn run(
     dataset: &Dataset,
     config: &TrackerConfig,
     arrival: Arrival,
     link: TrackerLink,
     mut replay: Replay,
-) -> Result<(), TrackingError> {
+) -> Result<f64, TrackingError> {
     let mut memory = vec![0; config.workspace_len()];
     let tracker = Tracker::new(config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
     let given = Given::default();
-    let mut front_end = FrontEnd { dataset, tracker, link: &link, given, moves: 0, last: None };
+    let mut front_end = FrontEnd {
+        dataset,
+        tracker,
+        link: &link,
+        given,
+        moves: 0,
+        last: None,
+        uncertainty: Uncertainty::default(),
+    };
     let pace = Pace::new(arrival, dataset.timestamp(0), 1.0 / dataset.calibration().frame_rate);
     for index in 0..dataset.len() {
         let arrived = pace.wait_for(dataset.timestamp(index));
@@ -74,14 +84,14 @@ pub(super) fn run(
             Some(told) => Some(vec![replay.take(told)]),
             None => front_end.instructions(arrival, index),
         };
-        let Some(instructions) = instructions else { return Ok(()) };
+        let Some(instructions) = instructions else { break };
         let tracked =
             if arrived { front_end.track(index, instructions) } else { front_end.skip(index, Skipped::Late) };
         if !replay.has(index) && link.frames.send(tracked).is_err() {
-            return Ok(());
+            break;
         }
     }
-    Ok(())
+    Ok(front_end.uncertainty.disagreement())
 }
 
 impl FrontEnd<'_, '_> {
@@ -115,6 +125,7 @@ impl FrontEnd<'_, '_> {
         };
         let ms = (begin.elapsed() + following).as_secs_f64() * 1e3;
         self.given.push(index);
+        self.uncertainty.add(&result);
         let revision = result.revision.as_ref().and_then(|revision| {
             let revised = self.given.index(revision.index)?;
             let timestamp = self.dataset.timestamp(revised);

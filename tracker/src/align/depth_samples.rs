@@ -85,6 +85,7 @@ impl<'a> DepthSampler<'a> {
         let splat = |value: f32| f32x8::splat(simd, value);
         let (one, zero) = (splat(1.0), splat(0.0));
         let [fx, fy] = self.focal;
+        // The measured point in the keyframe: R (x, y, 1)/rho + p.
         let y = (v - self.centre[1]) * (1.0 / fy);
         let row_ray = self.rotation.column(1) * y + self.rotation.column(2);
         let x = (u - self.centre[0]) * (1.0 / fx);
@@ -93,13 +94,16 @@ impl<'a> DepthSampler<'a> {
             core::array::from_fn(|i| (x * self.rotation[(i, 0)] + row_ray[i]) * distance);
         let point: [f32x8<S>; 3] = core::array::from_fn(|i| arm[i] + self.position[i]);
         let in_front = measured & point[2].simd_ge(MIN_Z);
+        // Its pixel there; lanes behind the keyframe divide by one.
         let inverse_z = one / in_front.select(point[2], one);
         let (a, b) = (point[0] * inverse_z, point[1] * inverse_z);
         let (ku, kv) = (a * fx + self.centre[0], b * fy + self.centre[1]);
         let (seen, surface, plane) = self.surface(simd, in_front, ku, kv);
+        // Inverse depth of the point less that of the surface; the gate keeps other surfaces out.
         let residual = inverse_z - surface;
         let near = residual.abs().simd_lt(self.problem.gate);
         let compared = seen & near & plane[0].simd_gt(0.0);
+        // Derivative by the point: along the image the surface rises, along z the point moves away.
         let (su, sv) = (plane[1] * fx * inverse_z, plane[2] * fy * inverse_z);
         let along = su * a + sv * b - inverse_z * inverse_z;
         let gated = (seen & !near).to_bitmask().count_ones() as usize;

@@ -168,6 +168,7 @@ impl Alignment<'_> {
         let camera = self.camera.at_level(plan.level);
         let keypoints = self.reference.keypoints[plan.level];
         let timing = self.frame.timing;
+        // Patches lie where the keypoints are seen at the current estimate, and stay until the image has moved.
         let in_view = place_sites(
             &estimate.path(),
             &timing,
@@ -177,6 +178,7 @@ impl Alignment<'_> {
             &self.frame,
             scratch.sites,
         );
+        // As many views as the blur has parts of a given length.
         let blur = blur_length(&exposure_of(&estimate, &timing), keypoints, &camera);
         let mut objective = Objective {
             simd: self.simd,
@@ -194,6 +196,7 @@ impl Alignment<'_> {
             inverse_depth: typical_inverse_depth(keypoints),
             settings: self.settings,
         };
+        // Noise and outliers from the residuals here: no step may change what counts.
         let kept = measure_photometric(&mut objective, &estimate, in_view, scratch);
         if self.settings.depth_term {
             objective.depth = measure_depth(&objective, &estimate, plan.depth_stride, scratch.medians);
@@ -206,6 +209,7 @@ impl Alignment<'_> {
         outcome.views = objective.views;
         outcome.patches = kept;
         outcome.patches_in_view = in_view;
+        // Both scales are over the noise of a good image.
         outcome.photometric_scale = sqrt_f32(objective.model.photon_variance / NOMINAL_PHOTON_VARIANCE);
         outcome.depth_scale = objective.depth.as_ref().map_or(0.0, |depth| depth.sigma);
         (objective, kept)
@@ -243,6 +247,7 @@ const LEAST_SHARE: f64 = 0.1;
 #[inline(never)]
 fn disagreement(at: &Linearised, estimate: &Estimate, depth_time: f64) -> f64 {
     let mut to_camera = Matrix6::identity();
+    // Rotations are of the camera, as in the other unknowns.
     let turn = estimate.keyframe_from_camera.mid().rotation_matrix().transpose();
     to_camera.fixed_view_mut::<3, 3>(3, 3).copy_from(&turn);
     let by_depth = to_camera * at.depth_pose.0 * to_camera.transpose();
@@ -285,6 +290,7 @@ fn descend(
         let Some(step) = damping.step(&at.hessian, &at.gradient) else {
             return stopped(&at, objective, outcome, StopReason::Singular);
         };
+        // A step that cannot be seen ends the descent.
         let pixels = step_in_pixels(&step, &objective.camera, objective.inverse_depth);
         if pixels < plan.min_step {
             outcome.estimate = outcome.estimate.stepped(&step);
@@ -297,6 +303,7 @@ fn descend(
         let next = objective.linearise(&candidate, Some((at.pixels, at.depth_compared)), costs);
         outcome.iterations += 1;
         outcome.work += objective.work();
+        // Levenberg-Marquardt: a step is kept when the cost falls by a fair share of what the model promised.
         let ratio = gain_ratio(&at, &next, &step);
         if next.cost < at.cost && ratio > MIN_GAIN_RATIO {
             damping.accept(ratio);
@@ -334,6 +341,7 @@ const MIN_SAMPLED_BLUR: f32 = 0.5;
 /// Largest image motion in pixels that a step causes at the scene's typical depth.
 fn step_in_pixels(step: &SVector<f64, BOWED_UNKNOWNS>, camera: &PinholeCamera, inverse_depth: f64) -> f64 {
     let pixels = |tangent: Vector6<f64>| {
+        // A translation is seen over the depth of the scene, a rotation at any depth.
         let translation = tangent.fixed_rows::<3>(0).norm() * inverse_depth;
         camera.fx * translation.max(tangent.fixed_rows::<3>(3).norm())
     };

@@ -66,8 +66,10 @@ impl<'m> BlurFlow<'m> {
         let per_row = self.blocks_per_row();
         let mut longest_squared = 0.0f32;
         for (block, displacement) in self.displacement.iter_mut().enumerate() {
+            // The centre of the block, and its depth there.
             let u = ((block % per_row) * BLOCK_WIDTH) as f32 + 0.5 * (BLOCK_WIDTH - 1) as f32;
             let v = ((block / per_row) * BLOCK_HEIGHT) as f32 + 0.5 * (BLOCK_HEIGHT - 1) as f32;
+            // All blocks of a row are exposed at the same time.
             if timing.reaches_outside() && block % per_row == 0 {
                 let middle = timing.row_time(f64::from(v), self.height);
                 let row_from_keyframe = keyframe_from_camera.at(middle).inverse();
@@ -80,6 +82,7 @@ impl<'m> BlurFlow<'m> {
             let rho = planes.inverse_depth(at(u), at(v)).unwrap_or(fallback_inverse_depth);
             let x = [(u - cx) / fx, (v - cy) / fy];
             let [a, b] = [ends[0].project(x, rho), ends[1].project(x, rho)];
+            // From opening to closing, pixels.
             *displacement = [(b[0] - a[0]) * fx, (b[1] - a[1]) * fy];
             let squared = displacement[0] * displacement[0] + displacement[1] * displacement[1];
             longest_squared = longest_squared.max(squared);

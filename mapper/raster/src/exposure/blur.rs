@@ -27,6 +27,7 @@ pub fn blur_length(exposure: &ExposureTrajectory, camera: &PinholeCamera, depth:
         for column in 0..GRID {
             let u = (column as f64 + 0.5) / GRID as f64 * camera.width as f64 - 0.5;
             let v = (row as f64 + 0.5) / GRID as f64 * camera.height as f64 - 0.5;
+            // Where a point of mid exposure is seen at opening and at closing.
             let x_mid = camera.ray(u, v) * depth;
             let at_start = camera.project(&start_from_mid.transform_point(&x_mid));
             let at_end = camera.project(&end_from_mid.transform_point(&x_mid));

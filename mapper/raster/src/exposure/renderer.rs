@@ -83,6 +83,7 @@ impl ExposureRenderer {
         if times.is_global() {
             return self.forward(gaussians, camera, path, views, background, scratch, image);
         }
+        // Every view has a weight in every row; views for depth follow those for colour and have none.
         let rows = RowViews::new(*times, views, camera.height);
         let ExposureScratch { rasters, poses, row_weights, colour_views, drawn, .. } = scratch;
         *colour_views = rows.count();
@@ -94,6 +95,7 @@ impl ExposureRenderer {
                 weights.extend(rows.weights(k));
             }
         }
+        // Poses at the times of all views.
         let depth_times = bands.iter().map(|(_, time)| *time);
         let all_times = (0..rows.count()).map(|k| rows.time(k)).chain(depth_times);
         poses.clear();
@@ -101,6 +103,7 @@ impl ExposureRenderer {
         if rasters.len() < poses.len() {
             rasters.resize_with(poses.len(), RasterScratch::default);
         }
+        // Only the rows in which a view counts are drawn.
         let rasters = &mut rasters[..poses.len()];
         rasters.par_iter_mut().zip(&*poses).enumerate().for_each(|(k, (raster, pose))| {
             let view = RasterView { camera: *camera, world_from_camera: pose.world_from_camera, background };
@@ -112,6 +115,7 @@ impl ExposureRenderer {
                 Some(k) => self.rasterizer.render_band(gaussians, &view, &bands[k].0, true, raster),
             }
         });
+        // The weighted mean, row by row.
         let parts = rasters.iter().zip(&*row_weights).enumerate();
         let parts: Vec<_> = parts
             .map(|(k, (scratch, weights))| BandView { scratch, weights, geometry: k >= rows.count() })
@@ -145,6 +149,7 @@ impl ExposureRenderer {
             "backward is for the Gaussians and the size of the exposure that was rendered before"
         );
         rasters.par_iter_mut().enumerate().for_each(|(k, raster)| {
+            // The share that the view had in the image: of all rows alike, of some rows, or of depth alone.
             let share = match row_weights.get(k) {
                 None => ViewShare { colour: ColourShare::Same(1.0 / views as f32), geometry: k == views / 2 },
                 Some(weights) if k < *colour_views => {
@@ -155,6 +160,7 @@ impl ExposureRenderer {
             self.rasterizer.replay_share(grad_image, share, raster);
         });
         self.rasterizer.project_views_backward(gaussians, rasters, pose_sums, gradients);
+        // The chain from every pose to the parameters of the path they lie on.
         let grad_view = poses.iter().enumerate();
         grad_view.map(|(k, pose)| pose.grad_path(&pose_sums.of_view(k, views))).sum()
     }

@@ -115,6 +115,7 @@ impl DisplayPlanes {
         weight: f32,
     ) -> LossTerms {
         let region = seen.region;
+        // Mean over the pixels that count, three values each.
         let counted = region.right.saturating_sub(region.left) * region.bottom.saturating_sub(region.top) * 3;
         let share = 1.0 / counted.max(1) as f32;
         let columns = |y: usize| {
@@ -127,6 +128,7 @@ impl DisplayPlanes {
             let (light, bytes) = (&image.colour[channel], &seen.colour[channel]);
             let given = (light.par_chunks(image.width), bytes.par_chunks(image.width));
             let rows = rows.zip(given).enumerate();
+            // Rows are summed in their order, so that threads make no difference.
             let of_rows: Vec<[f32; 2]> = rows
                 .map(|(y, (mut row, given))| {
                     let falloff = seen.falloff.as_ref();
@@ -178,6 +180,7 @@ impl DisplayPlanes {
             let of_row = |(out, gradient, slope, light): (&mut [f32], &[f32], &[f32], &[f32])| {
                 let mut grad_gain = 0.0;
                 for x in 0..out.len() {
+                    // d/d(light) = d/d(display) * slope; light is proportional to the gain.
                     out[x] = gradient[x] * slope[x];
                     grad_gain += out[x] * light[x];
                 }

@@ -105,6 +105,7 @@ fn replay<S: Simd, const GEOMETRY: bool>(
 ) {
     let TileSplats { splats, list, origin } = tile;
     let [left, top] = origin.map(|pixel| pixel as f32);
+    // Back to front, so that what is behind a splat is known when it is its turn.
     for (index, (entry, out)) in list.iter().zip(out).enumerate().rev() {
         let splat = &splats[entry.rank as usize];
         let mut sums = Sums([S::f32s::splat(simd, 0.0); 12]);

@@ -121,6 +121,7 @@ impl ChunkEntries {
         self.counts.clear();
         let ranks = chunk * CHUNK..((chunk + 1) * CHUNK).min(order.len());
         for rank in ranks {
+            // Emissions of one rank follow each other; their number is kept for the sums of the backward pass.
             let before = self.entries.len();
             let outline = Outline::new(&order.splats[rank], &order.extents[rank]);
             outline.for_each_tile(grid, |tile, rows| {
@@ -173,6 +174,7 @@ impl Outline {
     fn rows_of_block(&self, grid: &TileGrid, block: usize) -> (usize, usize) {
         let [radius, _] = self.extent.radius;
         let left = (block * BLOCK_WIDTH) as f32 - self.centre[0];
+        // The part of the ellipse within the columns of the block.
         let low = (left - self.margin).max(-radius);
         let high = (left + (BLOCK_WIDTH - 1) as f32 + self.margin).min(radius);
         if low > high || high.is_nan() {
@@ -183,6 +185,7 @@ impl Outline {
             let half = self.extent.half_height * (1.0 - x * x).max(0.0).sqrt();
             self.centre[1] + self.extent.lean * dx + side * half
         };
+        // The chord is highest at the top of the ellipse, or at the edge of the block next to it.
         let upper = chord((-self.extent.top).max(low).min(high), -1.0);
         let lower = chord(self.extent.top.max(low).min(high), 1.0);
         pixel_range(upper - self.margin, lower + self.margin, grid.height)

@@ -309,6 +309,7 @@ impl Rasterizer {
     /// Replays a range of tiles, whose lists have the length of `sums` together.
     fn replay_tiles(&self, input: &Replay, tiles: Range<usize>, sums: &mut [SplatSums]) {
         if tiles.len() > 1 {
+            // Halves until a tile is left: lists are disjoint parts of the sums, and need no lock.
             let middle = tiles.start + tiles.len() / 2;
             let start = &input.scratch.bins.tile_start;
             let (left, right) = sums.split_at_mut((start[middle] - start[tiles.start]) as usize);
@@ -367,6 +368,7 @@ impl Rasterizer {
     ) {
         let pieces = pose_sums.len() / views.len().max(1);
         if pieces > 1 {
+            // The same pieces for any number of threads: sums come out alike.
             let count = pieces / 2 * GAUSSIANS_PER_PIECE;
             let (left_sums, right_sums) = pose_sums.split_at_mut(pieces / 2 * views.len());
             let (left, right) = out.split_at(count);

@@ -103,6 +103,7 @@ fn composite_list<S: Simd, const DEPTH: bool, const COUNT: bool>(
     for (index, entry) in list.iter().enumerate() {
         let splat = &splats[entry.rank as usize];
         let end = (index + 1) as f32;
+        // Only the cells of a block that the ellipse reaches.
         for (block, &range) in entry.rows.iter().enumerate() {
             let falloff = BlockFalloff::new(simd, splat, left + (block * BLOCK_WIDTH) as f32);
             let from_centre = top - splat.centre[1];
@@ -111,6 +112,7 @@ fn composite_list<S: Simd, const DEPTH: bool, const COUNT: bool>(
                 let cell = first + offset;
                 let dy = from_centre + (cell * CELL_HEIGHT) as f32;
                 for part in (0..parts::<S>()).filter(|&part| is_listed::<S>(range, cell, part)) {
+                    // alpha = opacity exp(-d^T C d / 2), and front-to-back compositing.
                     let at = falloff.at(simd, dy, part);
                     let used = blend::<_, DEPTH>(simd, splat, &at, end, pixels, part);
                     if COUNT {
@@ -120,6 +122,7 @@ fn composite_list<S: Simd, const DEPTH: bool, const COUNT: bool>(
                 }
             }
         }
+        // What lies behind opaque pixels is not looked at.
         if (index + 1) % TEST_INTERVAL == 0 && is_finished(simd, pixels) {
             break;
         }
@@ -142,6 +145,7 @@ fn blend<S: Simd, const DEPTH: bool>(
     let transmittance = load(&cell.transmittance);
     let (zero, one) = (S::f32s::splat(simd, 0.0), S::f32s::splat(simd, 1.0));
     let visible = at.alpha.simd_ge(MIN_ALPHA as f32);
+    // A splat that would make the pixel opaque is the first that is left out.
     let behind = transmittance * (one - at.alpha);
     let used = visible & behind.simd_gt(MIN_TRANSMITTANCE as f32);
     let weight = used.select(at.alpha * transmittance, zero);

@@ -164,6 +164,7 @@ pub(super) fn store_weighted(parts: &[RowPart<'_>], grid: &TileGrid, rows: &mut 
     rows.store(grid, |across, block, cell| {
         let mut planes = [[0.0; CELL]; 5];
         for RowPart { tiles, background, weights, geometry } in parts {
+            // What is left of the light of a pixel is the background's; the sign of transmittance is a mark.
             let pixels = &tiles[across].blocks[block][cell];
             for row in 0..CELL_HEIGHT {
                 let weight = weights[cell * CELL_HEIGHT + row];
@@ -180,6 +181,7 @@ pub(super) fn store_weighted(parts: &[RowPart<'_>], grid: &TileGrid, rows: &mut 
                     });
                 }
             }
+            // Depth and alpha have one time: they are no mean.
             if *geometry {
                 planes[3] = pixels.depth;
                 planes[4] = pixels.transmittance.map(|left| 1.0 - left.abs());

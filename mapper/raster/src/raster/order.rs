@@ -76,6 +76,7 @@ fn sort_by_key(keys: &mut Vec<(u32, u32)>, swap: &mut Vec<(u32, u32)>) {
     swap.resize(keys.len(), (0, 0));
     for pass in 0..u32::BITS.div_ceil(DIGIT_BITS) {
         let digit = |key: u32| (key >> (pass * DIGIT_BITS)) as usize % DIGITS;
+        // Counts per digit, then places where each digit begins, then one move in the old order.
         let mut next = [0_u32; DIGITS];
         keys.iter().for_each(|&(key, _)| next[digit(key)] += 1);
         let mut start = 0;

@@ -89,6 +89,7 @@ fn store<S: Simd>(simd: S, view: &ViewNumbers, lanes: &Lanes<S>, out: &mut [Proj
     let drawn = lanes.drawn & overlaps_image(view, lanes, &extent);
     let drawn = drawn.to_bitmask();
     let (c, w, rgb) = (&lanes.centre, &lanes.whitening, &lanes.colour);
+    // The exponent is a power of two: exp(-d^T d / 2) = 2^(-|s d|^2).
     let scale = (0.5 * LOG2_E).sqrt();
     // From slopes along the axes of the image to those along u and v.
     let along_u = lanes.tilt[0] / w[0];

@@ -73,6 +73,7 @@ fn backward_range<S: Simd>(
     for (step, ranks) in ranks.enumerate() {
         if reduce(ranks, input.bins, input.sums, &mut sums) {
             let at = step * LANES;
+            // Projected once more: cheaper than keeping what the forward pass knew.
             let lanes = Lanes::new(simd, input.view, &load(simd, input.planes, first + at));
             let grad_splat = SplatGradientLanes::new(simd, &lanes, &sums);
             let (grad_parameters, grad_rows) = lanes.backward(input.view, &grad_splat);
@@ -173,10 +174,12 @@ impl<S: Simd> Lanes<S> {
         grad_splat: &SplatGradientLanes<S>,
     ) -> ([f32x8<S>; PARAMETERS], LaneMatrix<S, 3, 4>) {
         let grad_axes_image = self.grad_axes_image(grad_splat);
+        // J = (fx/z, 0, -fx x/z^2; 0, fy/z, -fy y/z^2) with the slope (x/z, y/z), which is bounded beside the image.
         let [across_x, across_y] = each(
             #[inline(always)]
             |i| self.inverse_z * view.focal[i],
         );
+        // J^T times the gradient by the axes on the image, and what camera z of the axes gets through the tilt.
         let grad_axes_camera: LaneMatrix<S, 3, 3> = {
             let [v, w] = grad_axes_image;
             let (x, y) = (across_x * self.slope[0], across_y * self.slope[1]);
@@ -195,6 +198,7 @@ impl<S: Simd> Lanes<S> {
                 ),
             ]
         };
+        // The centre moves the splat, its depth and J; the axes turn back into the world.
         let grad_x_camera = self.grad_x_camera(view, grad_splat, &grad_axes_image);
         let grad_axes_world = rotate_back(view, &grad_axes_camera);
 
@@ -205,6 +209,7 @@ impl<S: Simd> Lanes<S> {
             grad_parameters[LOG_SCALE + j] = (0..3).fold(
                 zero,
                 #[inline(always)]
+                // An axis is exp(log scale) times its direction: its derivative is the axis itself.
                 |sum, i| grad_axes_world[i][j].mul_add(self.axes_world[i][j], sum),
             );
             grad_parameters[COLOUR + j] = grad_splat.colour[j];

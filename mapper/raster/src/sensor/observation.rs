@@ -118,6 +118,7 @@ impl ObservationPyramid {
         let mut all = vec![full];
         for level in 1..levels {
             let finer = &all[level - 1];
+            // A side of 16 pixels has no room for a window of the similarity.
             if finer.camera.width < 32 || finer.camera.height < 32 {
                 break;
             }
@@ -158,6 +159,7 @@ fn blocks(finer: &Observation) -> impl IndexedParallelIterator<Item = [usize; 4]
 fn half(sensor: &Sensor, forward: &ForwardResponse, finer: &Observation, level: usize) -> Observation {
     let light = |byte: u8| sensor.inverse_response.linear_light(byte);
     let colour = finer.colour.each_ref().map(|plane| {
+        // Means are of light, not of stored values.
         let mean = |block: [usize; 4]| 0.25 * block.iter().map(|&pixel| light(plane[pixel])).sum::<f32>();
         blocks(finer).map(|block| forward.encode(mean(block))).collect()
     });

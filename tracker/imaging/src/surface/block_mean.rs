@@ -98,6 +98,7 @@ impl<'m> InverseDepthMap<'m> {
         let (fu, fv) = (u - i as f32, v - j as f32);
         let top = &self.values[j * self.width + i..][..2];
         let bottom = &self.values[(j + 1) * self.width + i..][..2];
+        // All four have to be measured and of one surface.
         let low = top[0].min(top[1]).min(bottom[0].min(bottom[1]));
         let high = top[0].max(top[1]).max(bottom[0].max(bottom[1]));
         if !(low > 0.0 && high - low < spread_limit(low)) {
@@ -136,6 +137,7 @@ fn block_means<S: Simd>(
             count += measured.select(one, zero);
         }
     }
+    // The extremes in inverse metres: the nearest value has the largest.
     let per_metre = f32x8::splat(simd, 1.0 / metres_per_unit);
     let (high, low) = (per_metre / nearest, per_metre / farthest.max(1.0));
     // The limit is linear in the inverse depth.
@@ -159,6 +161,7 @@ fn block_mean(raw: &DepthView, u: usize, v: usize, block: usize, metres_per_unit
             }
         }
     }
+    // Half of the pixels, at least.
     if count == 0 || 2 * count < block * block {
         return 0.0;
     }

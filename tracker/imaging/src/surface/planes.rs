@@ -102,6 +102,7 @@ impl<'m> SurfacePlanes<'m> {
         if !inside {
             return None;
         }
+        // The nearest node; slopes are per node.
         let (i, j) = ((u + 0.5) as usize, (v + 0.5) as usize);
         let index = j * self.width + i;
         let rho =
@@ -132,6 +133,7 @@ fn fit_planes<S: Simd>(simd: S, map: &InverseDepthMap, index: usize) -> [f32x8<S
     for j in 0..WINDOW {
         for i in 0..WINDOW {
             let rho = load(index + j * map.width + i - WINDOW_RADIUS * (map.width + 1));
+            // Relative to the centre, so that nothing cancels in single precision.
             let difference = rho - centre;
             let counts = rho.simd_gt(0.0) & difference.abs().simd_lt(limit);
             let (count, difference) = (counts.select(one, zero), counts.select(difference, zero));
@@ -146,6 +148,7 @@ fn fit_planes<S: Simd>(simd: S, map: &InverseDepthMap, index: usize) -> [f32x8<S
     }
     let has_support = s[0].simd_ge(MIN_SUPPORT) & centre.simd_gt(0.0);
     let inverse_count = one / s[0].max(1.0);
+    // Moments about the mean: the constant is eliminated, and a 2x2 system is left.
     let xx = s[3] - s[1] * s[1] * inverse_count;
     let xy = s[4] - s[1] * s[2] * inverse_count;
     let yy = s[5] - s[2] * s[2] * inverse_count;
@@ -153,6 +156,7 @@ fn fit_planes<S: Simd>(simd: S, map: &InverseDepthMap, index: usize) -> [f32x8<S
     let yt = t[2] - s[2] * t[0] * inverse_count;
     let determinant = xx * yy - xy * xy;
     let holds = has_support & determinant.simd_ge(MIN_DETERMINANT);
+    // Lanes without a plane divide by something, too.
     let determinant = determinant.max(MIN_DETERMINANT);
     let slope_u = (yy * xt - xy * yt) / determinant;
     let slope_v = (xx * yt - xy * xt) / determinant;
@@ -193,6 +197,7 @@ fn solve_plane(s: &[f32; 6], t: &[f32; 3]) -> Option<Plane> {
         return None;
     }
     let inverse_count = 1.0 / s[0];
+    // Moments about the mean, which leave a 2x2 system of the slopes.
     let (xx, xy, yy) = (
         s[3] - s[1] * s[1] * inverse_count,
         s[4] - s[1] * s[2] * inverse_count,
@@ -203,6 +208,7 @@ fn solve_plane(s: &[f32; 6], t: &[f32; 3]) -> Option<Plane> {
     if determinant < MIN_DETERMINANT {
         return None;
     }
+    // Cramer's rule.
     let slope_u = (yy * xt - xy * yt) / determinant;
     let slope_v = (xx * yt - xy * xt) / determinant;
     let value = (t[0] - slope_u * s[1] - slope_v * s[2]) * inverse_count;

@@ -163,8 +163,10 @@ impl<S: Simd, const ROW: usize> NormalEquations<S, ROW> {
         rows: &PatchRows<PATH>,
         k: usize,
     ) {
+        // H = sum w J J^T: half of the weight on either side.
         let root = whitened.weight.sqrt();
         let scale = root * whitened.inverse_sigma;
+        // Derivatives by the path are of the light before the gain.
         let pose_scale = scale * gain;
         let (pose, brightness) = self.columns.row.split_at_mut(rows.pose.len());
         for (column, derivative) in pose.iter_mut().zip(&rows.pose) {
@@ -215,6 +217,7 @@ impl<S: Simd, const ROW: usize> NormalEquations<S, ROW> {
 
     #[inline(always)]
     fn flush(&mut self) {
+        // Single precision holds a few patches; their sums go on in double precision.
         for (i, (totals, lanes)) in self.totals.iter_mut().zip(&mut self.lanes).enumerate() {
             for (total, lanes) in totals[i..].iter_mut().zip(&mut lanes[i..]) {
                 *total += f64::from(lanes.reduce_sum());
@@ -252,6 +255,7 @@ fn observed_intensities(image: &LevelImage, site: &PatchSite) -> [f32; PATCH_PIX
         && let Some(patch) = image.pixels.get((v - PATTERN_RADIUS) * image.width + u - PATTERN_RADIUS..)
         && patch.len() >= (2 * PATTERN_RADIUS - 1) * image.width + 2 * PATTERN_RADIUS
     {
+        // The whole patch is inside: one bounds check for all of its pixels.
         return core::array::from_fn(|k| {
             let row = (PATTERN_DV[k] + PATTERN_RADIUS as i32) as usize;
             let column = (PATTERN_DU[k] + PATTERN_RADIUS as i32) as usize;

@@ -159,6 +159,7 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     fn prepare<const ROLLING: bool>(&mut self, site: &PatchSite) -> bool {
         let [fx, fy] = self.problem.focal;
         let [cx, cy] = self.problem.centre;
+        // The keypoint on the plane of unit depth, and its plane z = depth in the reference.
         let x = (f32::from(site.u) - cx) * self.inverse_focal[0];
         let y = (f32::from(site.v) - cy) * self.inverse_focal[1];
         let rho = site.inverse_depth;
@@ -166,10 +167,12 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
         let mut in_front = rho > 0.0;
         let delay = self.delay(site);
         for (view, patch_view) in self.views.iter().zip(&mut self.patch_views) {
+            // Its ray in the reference frame, R (x, y, 1); pattern pixels are an offset from it.
             let mut ray: [f32; 3] = core::array::from_fn(|i| {
                 view.rotation[i][0] * x + view.rotation[i][1] * y + view.rotation[i][2]
             });
             let (mut position, mut time) = (view.position, view.time);
+            // First order of the motion until the row of the patch: the ray turns by omega x r, the centre shifts.
             if ROLLING {
                 let [shift, turn] = view.velocity;
                 let [rx, ry, rz] = ray;
@@ -181,10 +184,12 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
                 }
                 time += delay;
             }
+            // The plane has to be ahead of the view: w = depth - p_z.
             let distance = depth - position[2];
             in_front &= distance > MIN_PLANE_DISTANCE;
             let per_distance = 1.0 / distance;
             let bow = (time - 0.5) * (time - 0.5);
+            // u = c + f rho (p + w a): slope and shift of what is linear in a = r_x/r_z.
             *patch_view = PatchView {
                 ray,
                 slope: [fx * rho * distance, fy * rho * distance],
@@ -205,6 +210,7 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
         k: usize,
         mut add: impl FnMut(&VirtualView, &PatchView, &Located<S>, &Sampled<S>),
     ) -> S::mask32s {
+        // First all cells of a batch of views, then all their samples: loads do not wait for arithmetic.
         let mut valid = self.observed(site, k);
         for (views, patch_views) in self.views.chunks(BATCH).zip(self.patch_views.chunks(BATCH)) {
             for ((view, patch_view), located) in views.iter().zip(patch_views).zip(&mut self.batch) {
@@ -232,6 +238,7 @@ impl<'a, S: Simd> TransferKernel<'a, S> {
     #[inline(always)]
     fn store_values(&self, k: usize, sum: S::f32s, valid: S::mask32s, out: &mut PatchValues) {
         let (zero, one) = (S::f32s::splat(self.simd, 0.0), S::f32s::splat(self.simd, 1.0));
+        // Lanes with a sample that is no number are left out, too.
         let mean = sum * self.scale;
         let valid = valid & mean.is_finite();
         store(valid.select(mean, zero), &mut out.mean, k);
@@ -274,6 +281,7 @@ fn locate<S: Simd>(
     located: &mut Located<S>,
 ) -> S::mask32s {
     let ray = |i: usize| load(simd, &view.pattern_offset[i], k) + patch_view.ray[i];
+    // Perspective division: (a, b) = (r_x, r_y)/r_z.
     let ray_z = ray(2);
     let z = S::f32s::splat(simd, 1.0) / ray_z;
     let (a, b) = (ray(0) * z, ray(1) * z);
@@ -308,12 +316,14 @@ impl<S: Simd> RowSums<S> {
         t: &Located<S>,
         sampled: &Sampled<S>,
     ) {
+        // A and C of the equation above: gradients of the image along the plane.
         let along_u = sampled.gradient_u * patch_view.slope[0];
         let along_v = sampled.gradient_v * patch_view.slope[1];
         let e = t.a.mul_add(along_u, t.b * along_v);
         let translation = [along_u, along_v, -e];
         let rotation =
             [-t.b.mul_add(e, along_v), t.a.mul_add(e, along_u), t.a.mul_sub(along_v, t.b * along_u)];
+        // Translations go to both ends by the time of the view, rotations by its blend.
         self.value += sampled.value;
         for i in 0..3 {
             self.translation_start[i] =
@@ -348,6 +358,7 @@ impl<S: Simd> RowSums<S> {
     /// bow.
     #[inline(always)]
     fn columns<const PATH: usize>(&self) -> [S::f32s; PATH] {
+        // What does not go to the end of the exposure goes to its start: phi_0 = phi - phi_1.
         let (t0, t1, phi1) = (&self.translation_start, &self.translation_end, &self.rotation_end);
         let phi0: [S::f32s; 3] = core::array::from_fn(|i| self.rotation[i] - phi1[i]);
         core::array::from_fn(|i| match i / 3 {

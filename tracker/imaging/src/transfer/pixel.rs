@@ -46,6 +46,7 @@ pub fn transfer_pixel(
         return None;
     }
     let (a, b) = (ray.x / ray.z, ray.y / ray.z);
+    // Scales from metres on the plane to pixels, and with the distance of the plane to ratios of the ray.
     let (fx, fy) = (camera.fx / depth, camera.fy / depth);
     let (mu, mv) = (fx * plane_distance, fy * plane_distance);
     Some(TransferredPixel {

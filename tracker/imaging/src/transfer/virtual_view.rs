@@ -66,6 +66,7 @@ impl VirtualView {
         let velocity = path.velocity_left(s);
         let (shift, turn) =
             (Vector3::from(velocity.fixed_rows::<3>(0)), Vector3::from(velocity.fixed_rows::<3>(3)));
+        // Rows that come later see the keypoint moved on: (omega x R e_z + rho v) dt per row.
         let per_row = (turn.cross(&rotation.column(2)) + shift * inverse_depth) * row_step;
         Self {
             pattern_offset: pattern_offset(&rotation, camera, &per_row),
@@ -147,6 +148,7 @@ impl RowBand {
         views: &mut ArrayVec<VirtualView, MAX_VIRTUAL_VIEWS>,
     ) {
         let count = count.clamp(1, MAX_VIRTUAL_VIEWS);
+        // Views lie in the middle of equal parts of the exposure around the row.
         let middle = timing.row_time(self.centre(), self.height);
         let row_step = timing.readout / self.height as f64;
         let time = |k: usize| middle + timing.exposure * (SampleRule::Midpoint.time(k, count) - 0.5);

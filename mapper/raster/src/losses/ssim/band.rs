@@ -147,12 +147,14 @@ impl Band {
             self.moments.each_mut().map(|row| &mut row.as_chunks_mut::<LANES>().0[..count]);
         for chunk in 0..count {
             let mut sums = [f32x8::splat(simd, 0.0); MOMENTS];
+            // The window is a product: here down the columns, along the row afterwards.
             for (k, row) in rows.iter().enumerate() {
                 let weight = f32x8::splat(simd, window.weights[k.abs_diff(RADIUS)]);
                 let [x, y] = row[chunk];
                 let (x, y) = (f32x8::from_slice(simd, &x), f32x8::from_slice(simd, &y));
                 sums[0] = x.mul_add(weight, sums[0]);
                 sums[1] = y.mul_add(weight, sums[1]);
+                // x^2 and y^2 are only needed together.
                 sums[2] = x.mul_add(x, y * y).mul_add(weight, sums[2]);
                 sums[3] = (x * y).mul_add(weight, sums[3]);
             }
@@ -183,6 +185,7 @@ impl Band {
                     |k| f32x8::from_slice(simd, &rows[k][chunk]),
                 )
             };
+            // Similarity of the window, and the factors of 1, y and x in its gradient.
             let likeness =
                 Likeness::new(simd, [moment(&first), moment(&second), moment(&squares), moment(&product)]);
             let inside = lanes.simd_lt((across - LANES * chunk) as f32);
@@ -223,6 +226,7 @@ impl Band {
         let count = self.nothing.len();
         let mut rows: [&[[Chunk; FACTORS]]; WINDOW] = [&[]; WINDOW];
         for (k, factors) in rows.iter_mut().enumerate() {
+            // Windows beyond the image are no windows.
             let middle = (row + k).checked_sub(RADIUS).filter(|middle| windows.contains(middle));
             *factors = &middle.map_or(&self.nothing, |middle| &self.spread[middle % WINDOW])[..count];
         }
@@ -239,6 +243,7 @@ impl Band {
             let first = LANES * chunk;
             let x = load(simd, reference, first) - MIDDLE;
             let y = load(simd, estimate, first) - MIDDLE;
+            // d/dy = sum over the windows of w (a + b y + c x), in which x and y do not depend on the window.
             let change = factor(2).mul_add(x, factor(1).mul_add(y, factor(0)));
             add(simd, change * job.scale, gradient);
         }

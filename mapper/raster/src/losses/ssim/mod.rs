@@ -63,12 +63,14 @@ impl Ssim {
         if width < WINDOW || height < WINDOW {
             return 1.0;
         }
+        // The loss is the mean over all windows of the three channels.
         let windows = (width - 2 * RADIUS) * (height - 2 * RADIUS);
         let count = 3.0 * windows as f64;
         let scale = (f64::from(weight) / count) as f32;
         let per_channel = height.div_ceil(BAND_ROWS);
         self.bands.resize_with(3 * per_channel, Band::default);
 
+        // Bands are fixed, whatever the number of threads, and are summed in order.
         let channels = self.bands.par_chunks_mut(per_channel).zip(gradient).enumerate();
         channels.for_each(|(channel, (bands, gradient))| {
             let pieces = bands.par_iter_mut().zip(gradient.par_chunks_mut(BAND_ROWS * width)).enumerate();

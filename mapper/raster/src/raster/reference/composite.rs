@@ -45,12 +45,15 @@ pub(super) fn composite(
     let mut pixel = Pixel { colour: Vector3::zeros(), depth: 0.0, alpha: 0.0, contributions: Vec::new() };
     for (index, splat) in splats.iter().enumerate() {
         let offset = at - splat.centre;
+        // alpha = opacity exp(-d^T C d / 2).
         let raw = splat.opacity * (-0.5 * (splat.conic * offset).dot(&offset)).exp();
         let Some((alpha, alpha_by_logarithm)) = effective_alpha(raw, cutoff) else { continue };
         let behind = transmittance * (1.0 - alpha);
+        // The pixel is opaque.
         if cutoff == Cutoff::Hard && behind <= MIN_TRANSMITTANCE {
             break;
         }
+        // C = sum of c_i alpha_i T_i with T_i = product of (1 - alpha_j) before i.
         let weight = alpha * transmittance;
         pixel.colour += weight * splat.colour;
         pixel.depth += weight * splat.depth_at(&offset);
@@ -114,9 +117,11 @@ impl Pixel {
             gradient.centre -= grad_depth * splat.tilt;
 
             let depth = splat.depth_at(&offset);
+            // dC/d(alpha_i) = T_i (c_i - C_behind), all as seen through the splats before.
             let own = grad_pixel.colour.dot(&splat.colour) + grad_pixel.depth * depth + grad_pixel.alpha;
             let grad_alpha = contribution.transmittance * (own - behind);
             let grad_logarithm = grad_alpha * contribution.alpha_by_logarithm;
+            // By the logarithm of alpha: opacity is a factor, the exponent a quadratic form.
             gradient.opacity += grad_logarithm / splat.opacity;
             gradient.centre += grad_logarithm * (splat.conic * offset);
             gradient.conic[0] -= grad_logarithm * 0.5 * offset.x * offset.x;

@@ -105,20 +105,24 @@ impl Steps {
         let camera_from_world = view.world_from_camera.inverse();
         let world_to_camera = camera_from_world.rotation_matrix();
         let x_camera = world_to_camera * gaussian.mean + camera_from_world.translation;
+        // Beyond the edge of the image the Jacobian is that of the edge: it grows without bound there.
         let limits = view.jacobian_limits();
         let z = x_camera.z;
         let exact = [x_camera.x / z, x_camera.y / z];
         let slope = [0, 1].map(|i| exact[i].clamp(limits[i][0], limits[i][1]));
         let (fx, fy) = (view.camera.fx, view.camera.fy);
         let jacobian = Matrix2x3::new(fx / z, 0.0, -fx * slope[0] / z, 0.0, fy / z, -fy * slope[1] / z);
+        // Sigma = (R S)(R S)^T; quaternions need not have length 1.
         let quaternion_norm = Vector4::from(gaussian.rotation).norm();
         let quaternion = Vector4::from(gaussian.rotation) / quaternion_norm;
         let orientation = rotation_matrix(&quaternion);
         let axes_world = orientation * Matrix3::from_diagonal(&gaussian.scale);
         let axes_camera = world_to_camera * axes_world;
+        // Sigma' = (J W R S)(J W R S)^T (Zwicker et al. 2001), widened to a pixel.
         let image_axes = jacobian * axes_camera;
         let covariance = image_axes * image_axes.transpose();
         let conic = inverse(&(covariance + Matrix2::from_diagonal_element(LOW_PASS)));
+        // Camera z over the image: Cov(z, uv) Cov(uv, uv)^-1, the regression of depth on the pixel.
         let tilt_conic = inverse(&(covariance + Matrix2::from_diagonal_element(TILT_LOW_PASS)));
         let tilt = tilt_conic * (image_axes * axes_camera.row(2).transpose());
         Self {

@@ -62,6 +62,7 @@ pub fn gradients(
         };
         pixel.backward(&sorted.splats, &background, &grad_pixel, &mut grad_splat);
     });
+    // From the splats in their order of depth back to the Gaussians.
     let mut result = ReferenceGradients {
         gaussians: vec![ReferenceGradient::default(); gaussians.len()],
         ..ReferenceGradients::default()

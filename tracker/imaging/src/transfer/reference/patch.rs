@@ -22,12 +22,14 @@ pub fn sample(image: &LevelImage, u: f32, v: f32) -> Option<(f32, f32, f32)> {
     if !inside {
         return None;
     }
+    // The last column and row belong to the cell before them.
     let i = (floor_to_i32(u) as usize).min(w - 2);
     let j = (floor_to_i32(v) as usize).min(h - 2);
     let (fu, fv) = (u - i as f32, v - j as f32);
     let top = &image.pixels[j * w + i..][..2];
     let bottom = &image.pixels[(j + 1) * w + i..][..2];
     let (du_top, du_bottom) = (top[1] - top[0], bottom[1] - bottom[0]);
+    // Along both rows, then between them; the gradient is that of the same surface.
     let t0 = top[0] + fu * du_top;
     let t1 = bottom[0] + fu * du_bottom;
     Some((t0 + fv * (t1 - t0), du_top + fv * (du_bottom - du_top), t1 - t0))
@@ -59,6 +61,7 @@ impl PatchView {
     fn new(problem: &TransferProblem, view: &VirtualView, site: &PatchSite) -> Self {
         let x = (f32::from(site.u) - problem.centre[0]) / problem.focal[0];
         let y = (f32::from(site.v) - problem.centre[1]) / problem.focal[1];
+        // Ray through the keypoint, and the distance of its plane from the centre of the view.
         let rho = site.inverse_depth;
         let plane_distance = 1.0 / rho - view.position[2];
         Self {
@@ -80,6 +83,7 @@ impl PatchView {
         if !(r[2] > MIN_RAY_Z && self.plane_distance > MIN_PLANE_DISTANCE && self.inverse_depth > 0.0) {
             return None;
         }
+        // Perspective division, then u = c + f rho (p + w a).
         let z = 1.0 / r[2];
         let (a, b) = (r[0] * z, r[1] * z);
         Some(Transferred { u: self.slope[0] * a + self.shift[0], v: self.slope[1] * b + self.shift[1], a, b })
@@ -98,6 +102,7 @@ pub fn patch_values(problem: &TransferProblem, site: &PatchSite, out: &mut Patch
     let scale = 1.0 / problem.views.len() as f32;
     *out = PatchValues::default();
     for k in 0..PATCH_PIXELS {
+        // A pixel counts only where every view of the exposure sees it.
         let mut sum = 0.0;
         let mut all_valid = observed(problem, site, k);
         for view in problem.views {
@@ -135,12 +140,14 @@ pub fn patch_rows(problem: &TransferProblem, site: &PatchSite, out: &mut PatchRo
                 continue;
             };
             sum += value;
+            // The chain: sampled light by the pose of its view, that pose by both ends of the path.
             let (translation, rotation) = pose_row(&patch_view, &t, gu, gv);
             accumulate_ends(view, &translation, &rotation, &mut row);
         }
         if all_valid && (sum * scale).is_finite() && row.iter().all(|entry| entry.is_finite()) {
             out.values.mean[k] = sum * scale;
             out.values.valid[k] = 1.0;
+            // The mean over the views, as for the light itself.
             for (column, value) in out.pose.iter_mut().zip(row) {
                 column[k] = value * scale;
             }
@@ -152,6 +159,7 @@ pub fn patch_rows(problem: &TransferProblem, site: &PatchSite, out: &mut PatchRo
 fn pose_row(patch_view: &PatchView, t: &Transferred, gu: f32, gv: f32) -> ([f32; 3], [f32; 3]) {
     let big_a = gu * patch_view.slope[0];
     let big_c = gv * patch_view.slope[1];
+    // With A = g_u m_u, C = g_v m_v and e = a A + b C, as at the vectorised twin.
     let e = t.a * big_a + t.b * big_c;
     let per_distance = 1.0 / patch_view.plane_distance;
     (
@@ -166,6 +174,7 @@ fn accumulate_ends(view: &VirtualView, translation: &[f32; 3], rotation: &[f32; 
         row[i] += (1.0 - view.time) * translation[i];
         row[6 + i] += view.time * translation[i];
     }
+    // phi_s = (I - B_L) phi_start + B_L phi_end.
     for j in 0..3 {
         let to_end: f32 = (0..3).map(|i| rotation[i] * view.blend_left[i][j]).sum();
         row[9 + j] += to_end;

@@ -52,10 +52,12 @@ pub fn linearize(
             let (cost, weight) = huber(r, model.huber);
             patch.cost += cost;
             patch.pixels += 1.0;
+            // Derivatives of (gain mean + offset - observed)/sigma: twelve by the path, then by gain and offset.
             let mut row = [0.0f32; ROW_LENGTH];
             for (entry, column) in row.iter_mut().zip(&rows.pose) {
                 *entry = problem.brightness.gain * inverse_sigma * column[k];
             }
+            // By the gain and by the offset.
             row[12] = inverse_sigma * rows.values.mean[k];
             row[13] = inverse_sigma;
             add_row(&row, weight, r, &mut h, &mut g);
@@ -113,6 +115,7 @@ fn whitened_residual(
     let u = (i32::from(site.u) + PATTERN_DU[k]) as usize;
     let v = (i32::from(site.v) + PATTERN_DV[k]) as usize;
     let observed = problem.current.pixels[v * problem.current.width + u];
+    // Noise of the sensor: a constant part, and shot noise that grows with the light.
     let inverse_sigma = 1.0 / sqrt_f32(model.read_variance + model.photon_variance * observed);
     let predicted = problem.brightness.gain * values.mean[k] + problem.brightness.offset;
     let r = (predicted - observed) * inverse_sigma;

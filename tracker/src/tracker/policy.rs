@@ -35,11 +35,14 @@ impl Typical {
         if outcome.photometric_scale < COPY {
             return;
         }
-        let share = if self.residual == 0.0 { 1.0 } else { 0.2 };
+        let share = if self.residual == 0.0 { 1.0 } else { LEARNT_SHARE };
         self.residual += share * (outcome.photometric_scale - self.residual);
         self.depth_residual += share * (outcome.depth_scale - self.depth_residual);
     }
 }
+
+/// Share of a new frame in the running means: they follow a change of exposure or light within ten frames.
+const LEARNT_SHARE: f32 = 0.2;
 
 /// Photometric residual of a frame that is a copy of its reference, nominal standard deviations: it tells nothing about
 /// how well others can fit.
@@ -58,6 +61,25 @@ const DEPTH_RESIDUAL_FLOOR: f32 = 5e-4;
 /// their contrast, 30 and more. With a wrong response and jerky rows frames that match reach 16.
 const RESIDUAL_CEILING: f32 = 24.0;
 
+/// Shares of the keyframe's patches that agree: as few as the first agree by chance, and between the two a pose rests on a
+/// corner of the image.
+const CHANCE_INLIERS: f32 = 0.08;
+const FEW_INLIERS: f32 = 0.2;
+
+/// Points of depth that hold the six numbers of a pose where the picture does not: fifty for each.
+const ENOUGH_DEPTH_POINTS: usize = 300;
+
+/// Residual of depth up to which depth agrees with the keyframe, relative to what is usual: as a residual of the picture that
+/// is weak, with room for holes and edges.
+const DEPTH_AGREES: f32 = 3.0;
+
+/// Photometric residuals relative to what is usual: from the first on another try is worth its time, from the second on the
+/// frame is weak, from the third on it is lost unless depth agrees. Wrong poses begin where frames of one keyframe differ by
+/// more than blur, distance and exposure make them.
+const RETRIED_RESIDUAL: f32 = 2.0;
+const WEAK_RESIDUAL: f32 = 2.5;
+const LOST_RESIDUAL: f32 = 4.0;
+
 /// How far the pose can be trusted, and why no further.
 pub(super) fn judge(
     outcome: &LevelOutcome,
@@ -67,7 +89,7 @@ pub(super) fn judge(
     let lost = |doubt| (FrameStatus::Lost, Some(doubt));
     let weak = |doubt| (FrameStatus::Weak, Some(doubt));
     let aligned = !matches!(outcome.stop, StopReason::NoData | StopReason::Singular);
-    let measured = evidence.inliers > 0.08 || outcome.depth_points > 300;
+    let measured = evidence.inliers > CHANCE_INLIERS || outcome.depth_points > ENOUGH_DEPTH_POINTS;
     if !(aligned && measured) {
         return lost(Doubt::NoMatch);
     }
@@ -79,14 +101,14 @@ pub(super) fn judge(
     }
     let residual = ratio(outcome.photometric_scale, typical.residual, RESIDUAL_FLOOR);
     let depth_residual = ratio(outcome.depth_scale, typical.depth_residual, DEPTH_RESIDUAL_FLOOR);
-    let depth_agrees = outcome.depth_points > 300 && depth_residual < 3.0;
-    if residual > 4.0 && !depth_agrees {
+    let depth_agrees = outcome.depth_points > ENOUGH_DEPTH_POINTS && depth_residual < DEPTH_AGREES;
+    if residual > LOST_RESIDUAL && !depth_agrees {
         return lost(Doubt::Residual);
     }
-    if residual > 2.5 || outcome.photometric_scale > RESIDUAL_CEILING {
+    if residual > WEAK_RESIDUAL || outcome.photometric_scale > RESIDUAL_CEILING {
         return weak(Doubt::Residual);
     }
-    if evidence.inliers < 0.2 { weak(Doubt::Inliers) } else { (FrameStatus::Ok, None) }
+    if evidence.inliers < FEW_INLIERS { weak(Doubt::Inliers) } else { (FrameStatus::Ok, None) }
 }
 
 /// Whether an image shows nothing that could be aligned: its coarsest level is as flat as a lens cap or a light.
@@ -107,7 +129,7 @@ const FLAT: f32 = 2e-3;
 
 /// Whether an alignment fits so much worse than usual that another try from other guesses is worth its time.
 pub(super) fn fits_badly(outcome: &LevelOutcome, typical: &Typical) -> bool {
-    ratio(outcome.photometric_scale, typical.residual, RESIDUAL_FLOOR) > 2.0
+    ratio(outcome.photometric_scale, typical.residual, RESIDUAL_FLOOR) > RETRIED_RESIDUAL
 }
 
 /// A value relative to what is usual, which is `floor` at the least; 1 while nothing is usual.
@@ -127,13 +149,33 @@ pub(super) fn wants_keyframe(
     rolling: bool,
 ) -> bool {
     let width = image_width as f32;
-    let usable = evidence.depth_share > 0.15;
-    let much_sharper = evidence.blur + 1.0 < 0.6 * keyframe_blur;
-    let far = evidence.overlap < 0.6 || evidence.flow > 0.2 * width;
-    let as_sharp = evidence.blur < (1.2 * keyframe_blur).max(if rolling { 0.012 } else { 0.006 } * width);
-    let leaving = evidence.overlap < 0.45 || evidence.flow > 0.3 * width;
+    let usable = evidence.depth_share > KEYFRAME_DEPTH_SHARE;
+    // A pixel less, so that frames without blur do not take turns.
+    let much_sharper = evidence.blur + 1.0 < MUCH_SHARPER * keyframe_blur;
+    let far = evidence.overlap < FAR_OVERLAP || evidence.flow > FAR_FLOW * width;
+    let sharp = if rolling { SHARP_ROLLING } else { SHARP } * width;
+    let as_sharp = evidence.blur < (AS_SHARP * keyframe_blur).max(sharp);
+    let leaving = evidence.overlap < LEAVING_OVERLAP || evidence.flow > LEAVING_FLOW * width;
     usable && (much_sharper || (far && as_sharp) || leaving)
 }
+
+/// Share of the image with depth that a keyframe needs: with less, most of what it shows has no place in space.
+const KEYFRAME_DEPTH_SHARE: f32 = 0.15;
+
+/// Blur relative to the keyframe's: below the first a frame is much sharper, below the second as sharp.
+const MUCH_SHARPER: f32 = 0.6;
+const AS_SHARP: f32 = 1.2;
+
+/// Blur that is none, as a share of the width: 4 pixels of 640, and twice that for rolling rows.
+const SHARP: f32 = 0.006;
+const SHARP_ROLLING: f32 = 0.012;
+
+/// Shares of the patches in view and of the width that the image has moved, from which a frame is far from the keyframe, and
+/// from which its view is about to be lost: half of the patches still have to hold the next frame.
+const FAR_OVERLAP: f32 = 0.6;
+const FAR_FLOW: f32 = 0.2;
+const LEAVING_OVERLAP: f32 = 0.45;
+const LEAVING_FLOW: f32 = 0.3;
 
 #[cfg(test)]
 mod tests {

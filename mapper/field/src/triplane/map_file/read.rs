@@ -16,6 +16,9 @@ use crate::triplane::settings::{CHANNELS, FieldSettings, HIDDEN, MOST_REFINEMENT
 /// Bytes before the decoders.
 const HEADER_LEN: usize = 76;
 
+/// Largest logarithm of a sharpness, either way: surfaces of 1e-9 truncations, beyond single precision.
+const LARGEST_LOG_SHARPNESS: f32 = 20.0;
+
 /// Bytes of the weights of both decoders.
 const DECODERS_LEN: usize = 4 * (Layers::<1>::COUNT + Layers::<3>::COUNT);
 
@@ -119,7 +122,7 @@ impl Reader<'_> {
             }
         }
         let log_sharpness = self.f32_at(40);
-        if log_sharpness.is_nan() || log_sharpness.abs() > 20.0 {
+        if log_sharpness.is_nan() || log_sharpness.abs() > LARGEST_LOG_SHARPNESS {
             return Err(self.refused("logarithm of the sharpness", log_sharpness.to_string(), "-20 to 20"));
         }
         for axis in 0..3 {

@@ -69,11 +69,19 @@ impl Taps {
 ///
 /// `image` and `out` have the size of `flow`. The path is symmetric about the pixel, so the operator is its own
 /// adjoint as far as the flow is smooth.
+///
+/// # Panics
+/// If `image` or `out` has another length than the images that the flow is for.
 pub fn blur_along(level: Level, image: &[f32], flow: &BlurFlow, views: usize, out: &mut [f32]) {
     let size = flow.width * flow.height;
-    if image.len() < size || out.len() < size {
-        return;
-    }
+    assert_eq!(image.len(), size, "pixels of the image, for a flow of {} x {}", flow.width, flow.height);
+    assert_eq!(
+        out.len(),
+        size,
+        "pixels of the blurred image, for a flow of {} x {}",
+        flow.width,
+        flow.height
+    );
     dispatch!(level, simd => blur_blocks(simd, image, flow, views.clamp(1, MAX_VIRTUAL_VIEWS), out));
 }
 
@@ -265,11 +273,20 @@ mod tests {
         }
     }
 
-    #[test]
-    fn buffers_that_are_too_short_are_left_alone() {
+    fn blurred_into(pixels: usize, out: usize) {
         let flow = BlurFlow { width: WIDTH, height: HEIGHT, displacement: &mut vec![[1.0, 0.0]; blocks()] };
-        let mut out = vec![7.0; WIDTH * HEIGHT - 1];
-        blur_along(Level::new(), &image(), &flow, 3, &mut out);
-        assert!(out.iter().all(|light| *light == 7.0));
+        blur_along(Level::new(), &image()[..pixels], &flow, 3, &mut vec![0.0; out]);
+    }
+
+    #[test]
+    #[should_panic(expected = "pixels of the image, for a flow of")]
+    fn an_image_that_is_too_short_is_refused() {
+        blurred_into(WIDTH * HEIGHT - 1, WIDTH * HEIGHT);
+    }
+
+    #[test]
+    #[should_panic(expected = "pixels of the blurred image, for a flow of")]
+    fn a_place_that_is_too_short_is_refused() {
+        blurred_into(WIDTH * HEIGHT, WIDTH * HEIGHT - 1);
     }
 }

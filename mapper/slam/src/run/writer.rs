@@ -113,25 +113,25 @@ impl RunWriter {
         self.push(exposure, record)
     }
 
-    /// Replaces the exposure and the blur in pixels of frame `index`, counted from 0 in the order of pushing; nothing
-    /// happens if there is no such frame.
+    /// Replaces the exposure and the blur in pixels of frame `index`, counted from 0 in the order of pushing.
+    ///
+    /// # Panics
+    /// If there is no such frame.
     pub fn revise(&mut self, index: usize, exposure: TimedExposure, blur_px: f64) {
-        if let (Some(old), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
-            *old = exposure;
-            record.blur_px = blur_px;
-            self.unwritten += 1;
-        }
+        let (old, record) = self.frame_mut(index);
+        *old = exposure;
+        record.blur_px = blur_px;
     }
 
-    /// A lost frame `index` was found at a pose, its motion is unknown: it counts as weak. Nothing happens if there is no
-    /// such frame.
+    /// A lost frame `index` was found at a pose, its motion is unknown: it counts as weak.
+    ///
+    /// # Panics
+    /// If there is no such frame.
     pub fn recover(&mut self, index: usize, world_from_camera: &RigidTransform) {
-        if let (Some(exposure), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
-            let [start, mid, end] = [*world_from_camera; 3];
-            *exposure = TimedExposure { start, mid, end, ..*exposure };
-            (record.status, record.blur_px) = (FrameStatus::Weak, 0.0);
-            self.unwritten += 1;
-        }
+        let (exposure, record) = self.frame_mut(index);
+        let [start, mid, end] = [*world_from_camera; 3];
+        *exposure = TimedExposure { start, mid, end, ..*exposure };
+        (record.status, record.blur_px) = (FrameStatus::Weak, 0.0);
     }
 
     /// Moves every exposure to another world, which may be another one for each frame: `new_world_from_world` by index.
@@ -142,15 +142,24 @@ impl RunWriter {
         self.unwritten += self.exposures.len();
     }
 
-    /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map;
-    /// nothing happens if there is no such frame.
+    /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map.
+    ///
+    /// # Panics
+    /// If there is no such frame.
     pub fn refine(&mut self, index: usize, exposure: TimedExposure, gain: f64, is_keyframe: bool) {
-        if let (Some(old), Some(record)) = (self.exposures.get_mut(index), self.frames.get_mut(index)) {
-            *old = exposure;
-            record.gain = gain;
-            record.keyframe = u8::from(is_keyframe);
-            self.unwritten += 1;
-        }
+        let (old, record) = self.frame_mut(index);
+        *old = exposure;
+        record.gain = gain;
+        record.keyframe = u8::from(is_keyframe);
+    }
+
+    /// What is known of a frame, which is about to change.
+    #[track_caller]
+    fn frame_mut(&mut self, index: usize) -> (&mut TimedExposure, &mut FrameRecord) {
+        let count = self.frames.len();
+        assert!(index < count, "frame {index} of a run of {count} frames");
+        self.unwritten += 1;
+        (&mut self.exposures[index], &mut self.frames[index])
     }
 
     /// Adds a sentence about the input to the summary.
@@ -386,11 +395,19 @@ mod tests {
         push(&mut writer, 1, FrameStatus::Ok);
         let better = TimedExposure { timestamp: 0.0, ..frame(7, FrameStatus::Ok).0 };
         writer.revise(0, better, 6.5);
-        writer.revise(2, better, 1.0);
         writer.finish(|_| ()).unwrap();
         let run = Run::open(folder.path()).unwrap();
         assert_eq!(run.exposures, [better, frame(1, FrameStatus::Ok).0]);
         assert_eq!((run.frames[0].blur_px, run.frames[1].blur_px), (6.5, 2.0));
+    }
+
+    #[test]
+    #[should_panic(expected = "frame 1 of a run of 1 frames")]
+    fn a_frame_that_was_not_pushed_cannot_be_revised() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut writer = RunWriter::create_in(folder.path(), settings()).unwrap();
+        push(&mut writer, 0, FrameStatus::Ok);
+        writer.revise(1, frame(1, FrameStatus::Ok).0, 1.0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! A bundle that is being adjusted: blurred frames of the synthetic room and a map seeded from them.
 
 use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, FrameState, Keyframe, MapModel, PathPrior, StepReport,
+    BundleAdjustment, BundleSettings, FrameState, MapKeyframe, MapModel, PathPrior, StepReport,
 };
 use mba_mapper::exposure::{ExposurePath, RowTiming};
 use mba_mapper::map::MapKind;
@@ -98,8 +98,8 @@ pub(crate) fn sensor(sequence: &SynthSequence) -> Sensor {
     }
 }
 
-fn keyframe(sensor: &Sensor, index: usize, frame: SynthFrame) -> Option<Keyframe> {
+fn keyframe(sensor: &Sensor, index: usize, frame: SynthFrame) -> Option<MapKeyframe> {
     let prior = PathPrior { middle: frame.world_from_camera, motion: None };
     let observation = ObservationPyramid::new(sensor, &frame.into_captured(index), 2)?;
-    Some(Keyframe::new(index, observation, prior))
+    Some(MapKeyframe::new(index, observation, prior))
 }

@@ -4,7 +4,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::image::LevelImage;
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use mba_tracker::transfer::{
-    BrightnessModel, PatchSite, ResidualModel, RowTimes, TransferProblem, VirtualView, virtual_views,
+    BrightnessModel, PatchSite, ResidualModel, RowDelay, TransferProblem, VirtualView, virtual_views,
 };
 use nalgebra::Vector6;
 
@@ -50,7 +50,7 @@ impl TransferInput {
             centre: [CAMERA.cx as f32, CAMERA.cy as f32],
             views: &self.views,
             brightness: BrightnessModel { gain: 1.02, offset: -0.01 },
-            rows: RowTimes::default(),
+            rows: RowDelay::default(),
         }
     }
 }

@@ -11,7 +11,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use mba_mapper::evaluation::{Alignment, DEFAULT_MAX_DT};
+use mba_mapper::evaluation::{DEFAULT_MAX_DT, TrajectoryAlignment};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
 
@@ -73,7 +73,7 @@ pub enum Command {
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
     /// Write the surface of the map of a RUN folder as a coloured mesh
-    Mesh(surface::Mesh),
+    Mesh(surface::MeshArgs),
     /// Write a RUN folder in the format of another program: nerfstudio, COLMAP, KITTI, EuRoC, TUM
     Export(export::Export),
     /// Write report.html, charts and pictures into a RUN folder
@@ -360,7 +360,7 @@ pub struct EvalImages {
     pub depth_scale: f64,
 }
 
-/// Names of [`Alignment`] on the command line.
+/// Names of [`TrajectoryAlignment`] on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum AlignMode {
     /// Rotation and translation
@@ -372,7 +372,7 @@ pub enum AlignMode {
     None,
 }
 
-impl From<AlignMode> for Alignment {
+impl From<AlignMode> for TrajectoryAlignment {
     fn from(mode: AlignMode) -> Self {
         match mode {
             AlignMode::Se3 => Self::Se3,

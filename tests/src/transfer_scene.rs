@@ -4,7 +4,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::image::LevelImage;
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule};
 use mba_tracker::transfer::{
-    BrightnessModel, PatchSite, ResidualModel, RowTimes, TransferProblem, VirtualView, virtual_views,
+    BrightnessModel, PatchSite, ResidualModel, RowDelay, TransferProblem, VirtualView, virtual_views,
 };
 use nalgebra::Vector6;
 use rand_core::Rng;
@@ -81,7 +81,7 @@ impl TransferScene {
             centre: [self.camera.cx as f32, self.camera.cy as f32],
             views,
             brightness: self.brightness,
-            rows: RowTimes::default(),
+            rows: RowDelay::default(),
         }
     }
 

@@ -21,7 +21,7 @@ is y-up, is turned to stand upright; with --align it keeps the axes of the other
 Examples:
   mba mesh mapped --out mesh.glb
   mba mesh mapped --out mesh.ply --voxel-cm 0.5 --align data/groundtruth.txt")]
-pub struct Mesh {
+pub struct MeshArgs {
     /// RUN folder with a map
     #[arg(value_name = "RUN")]
     pub run: PathBuf,

@@ -1,6 +1,6 @@
 //! What a data set tells of the times and the light of its camera, and where it contradicts itself.
 
-use mba_mapper::dataset::{CalibrationSources, Dataset, ExposureSource, Readout, Response, Vignetting};
+use mba_mapper::dataset::{CalibrationSources, Dataset, ExposureSource, Response, Shutter, Vignetting};
 use mba_mapper::imu::{ImuRecording, TimedVector};
 use serde::Serialize;
 
@@ -46,8 +46,8 @@ impl CameraFacts {
                 Response::Table(_) => "table",
             },
             readout: match calibration.readout {
-                Readout::Global => "global",
-                Readout::Rolling { .. } => "rolling",
+                Shutter::Global => "global",
+                Shutter::Rolling { .. } => "rolling",
             },
             readout_s: calibration.readout.readout_seconds(),
             exposure_source: match calibration.exposure {

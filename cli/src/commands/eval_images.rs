@@ -1,6 +1,6 @@
 //! `mba eval images`.
 
-use mba_mapper::dataset::FrameError;
+use mba_mapper::dataset::FrameReadError;
 use mba_mapper::image_folders::{Comparison, ImageFolderError, compare};
 
 use super::open;
@@ -35,7 +35,8 @@ fn hint(error: &ImageFolderError) -> &'static str {
         }
         ImageFolderError::SizesDiffer { .. } => "render or resize the images to one size",
         ImageFolderError::KindsDiffer { .. } => "keep colour images and depth maps in different folders",
-        ImageFolderError::NotAnIndex { .. } | ImageFolderError::Image(FrameError::IndexOutOfRange { .. }) => {
+        ImageFolderError::NotAnIndex { .. }
+        | ImageFolderError::Image(FrameReadError::IndexOutOfRange { .. }) => {
             "--captured is for images named by the index of their frame, such as 000012.png; else leave it out"
         }
         ImageFolderError::Image(_) => "restore or remove that image",

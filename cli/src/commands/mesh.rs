@@ -10,14 +10,14 @@ use mba_mapper::mesh::{MeshFormat, YAxis};
 use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::run::{FrameStatus, Run, path_of};
 use mba_mapper::surfaces::{
-    DepthView, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map,
+    ColouredDepth, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map,
 };
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
 use super::open;
-use crate::args::surface::Mesh;
+use crate::args::surface::MeshArgs;
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, failed, is_disk_full};
 use crate::report::table::pairs;
@@ -41,7 +41,7 @@ struct Written {
 /// # Errors
 /// Bad input when run, map or trajectory cannot be used or the voxels are too small; failure when the mesh cannot be
 /// written.
-pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &MeshArgs, console: &Console) -> anyhow::Result<()> {
     let start = Instant::now();
     let run = open::run(&args.run)?;
     let (out, format) = output(args, &run)?;
@@ -93,7 +93,7 @@ pub fn run(args: &Mesh, console: &Console) -> anyhow::Result<()> {
 }
 
 /// Claims the file for the mesh, before the work, and says what its format is.
-fn output(args: &Mesh, run: &Run) -> anyhow::Result<(OutputFile, MeshFormat)> {
+fn output(args: &MeshArgs, run: &Run) -> anyhow::Result<(OutputFile, MeshFormat)> {
     let dataset = path_of(&run.summary.settings.dataset);
     let map = StoredMap::path(&run.folder);
     let mut inputs: Vec<&Path> = vec![&dataset];
@@ -149,7 +149,7 @@ impl ViewSource for Watched<'_> {
         self.views.count()
     }
 
-    fn view(&mut self, index: usize) -> DepthView {
+    fn view(&mut self, index: usize) -> ColouredDepth {
         self.progress.inc(1);
         self.views.view(index)
     }

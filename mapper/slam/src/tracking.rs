@@ -5,7 +5,7 @@ mod saved;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mba_io::dataset::{Dataset, FrameError, RgbdFrame};
+use mba_io::dataset::{Dataset, FrameReadError, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::error::{ConfigError, FrameError as TrackError};
 use mba_tracker::geometry::RigidTransform;
@@ -145,10 +145,13 @@ pub fn track_and_keep(
     for index in first..dataset.len() {
         let record = match track_frame(tracker.as_mut(), dataset, index, given.last().copied()) {
             Ok((result, ms)) => {
-                given.push(index);
-                if let Some(revision) = &result.revision {
-                    revise(dataset, run, given.get(revision.index).copied().unwrap_or(index), revision);
+                // A checkpoint may have a revision of a frame that it does not have.
+                if let Some(revision) = &result.revision
+                    && let Some(revised) = given.get(revision.index)
+                {
+                    revise(dataset, run, *revised, revision);
                 }
+                given.push(index);
                 let record = FrameRecord { sigma_m: uncertainty.add(&result), ..record(&result, ms) };
                 run.push(timed_result(&result), record)?;
                 record
@@ -186,7 +189,7 @@ fn revise(dataset: &Dataset, run: &mut RunWriter, index: usize, revision: &Revis
 #[derive(Debug, thiserror::Error)]
 enum SkipReason {
     #[error(transparent)]
-    Unreadable(#[from] FrameError),
+    Unreadable(#[from] FrameReadError),
     #[error(transparent)]
     Unusable(#[from] TrackError),
     #[error("there were no images when the data set was opened")]
@@ -255,11 +258,7 @@ pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     FrameRecord {
         timestamp: result.timestamp,
-        status: match result.status {
-            mba_tracker::FrameStatus::Ok => FrameStatus::Ok,
-            mba_tracker::FrameStatus::Weak => FrameStatus::Weak,
-            mba_tracker::FrameStatus::Lost => FrameStatus::Lost,
-        },
+        status: result.status,
         keyframe: u8::from(result.is_keyframe),
         ms,
         blur_px: f64::from(result.blur),

@@ -6,7 +6,7 @@ use mba_io::dataset::{Vignetting, response_text};
 use nalgebra::Vector3;
 
 use super::{
-    CameraMotion, DepthSensor, ResponseCurve, SensorModel, Summary, SynthConfig, SynthSequence, inertial,
+    CameraMotion, DepthSensor, ResponseCurve, SensorModel, SynthConfig, SynthSequence, SynthSummary, inertial,
 };
 
 /// Folder in a data set for what its calibration does not say.
@@ -81,7 +81,7 @@ pub(super) fn response_table(response: &ResponseCurve) -> Option<(&'static str, 
 }
 
 /// `README.md`: the settings, and what each file holds.
-pub(super) fn readme(sequence: &SynthSequence, summary: &Summary) -> String {
+pub(super) fn readme(sequence: &SynthSequence, summary: &SynthSummary) -> String {
     let SynthConfig { scene, frames, width, height, frame_rate, seed, gain, .. } = sequence.config();
     let config = sequence.config();
     let noise = match config.noise {

@@ -52,5 +52,5 @@ pub use config::{CameraMotion, DepthSensor, NoiseModel, ResponseCurve, SceneName
 pub use error::SynthError;
 pub use events::{Events, FrameRanges};
 pub use sequence::{SynthFrame, SynthSequence};
-pub use summary::Summary;
+pub use summary::SynthSummary;
 pub use writer::write_dataset;

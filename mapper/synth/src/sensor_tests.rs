@@ -1,6 +1,6 @@
 //! Checks of cameras that are not ideal, and of what goes wrong, against what geometry and optics say about them.
 
-use mba_io::dataset::{self, ExposureSource, Knowledge, Readout, Response, Vignetting};
+use mba_io::dataset::{self, ExposureSource, Knowledge, Response, Shutter, Vignetting};
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
@@ -280,7 +280,7 @@ fn what_is_not_on_record_is_in_the_truth() {
     let (sequence, known, _folder) = recorded(config.clone());
     assert!(known.warnings().is_empty(), "{:?}", known.warnings());
     let calibration = known.calibration();
-    assert_eq!(calibration.readout, Readout::Rolling { seconds: Some(0.02) });
+    assert_eq!(calibration.readout, Shutter::Rolling { seconds: Some(0.02) });
     assert_eq!(calibration.response, Response::Table(Box::new(measured.clone())));
     assert_eq!(calibration.vignetting, sensor.vignetting);
     assert_eq!(calibration.depth_readout_seconds, 0.01);
@@ -294,7 +294,7 @@ fn what_is_not_on_record_is_in_the_truth() {
     let unknown = SensorModel { is_on_record: false, ..sensor };
     let (_, silent, folder) = recorded(SynthConfig { sensor: unknown, ..config });
     let found = silent.calibration();
-    assert_eq!(found.readout, Readout::Rolling { seconds: None });
+    assert_eq!(found.readout, Shutter::Rolling { seconds: None });
     assert_eq!((&found.response, found.vignetting), (&Response::Srgb, Vignetting::NONE));
     let sources = found.sources;
     assert_eq!([sources.exposure, sources.response, sources.vignetting], [Knowledge::Assumed; 3]);

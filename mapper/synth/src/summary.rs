@@ -2,7 +2,7 @@
 
 /// What was written.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Summary {
+pub struct SynthSummary {
     /// Number of frames.
     pub frames: usize,
     /// Mean over the frames of their mean blur, pixels.

@@ -14,7 +14,7 @@ use mba_io::whole_file::{write_text, write_together};
 use rayon::prelude::*;
 
 use super::description::TRUTH_FOLDER;
-use super::summary::Summary;
+use super::summary::SynthSummary;
 use super::{BlurFigure, SynthError, SynthSequence, description, inertial, truth};
 
 /// Figures of one written frame.
@@ -70,7 +70,7 @@ pub fn write_dataset(
     sequence: &SynthSequence,
     folder: &Path,
     progress: impl Fn(usize, usize) + Sync,
-) -> Result<Summary, SynthError> {
+) -> Result<SynthSummary, SynthError> {
     let claimed = prepare(folder)?;
     let summary = write_all(sequence, folder, progress).inspect_err(|_| clear(folder))?;
     drop(claimed);
@@ -81,7 +81,7 @@ fn write_all(
     sequence: &SynthSequence,
     folder: &Path,
     progress: impl Fn(usize, usize) + Sync,
-) -> Result<Summary, SynthError> {
+) -> Result<SynthSummary, SynthError> {
     let truth = (!sequence.config().sensor.is_on_record).then_some(TRUTH_FOLDER);
     for name in IMAGE_FOLDERS.into_iter().chain(truth) {
         let path = folder.join(name);
@@ -110,7 +110,11 @@ fn write_all(
 }
 
 /// Names and contents of the text files, the calibration last.
-fn texts(sequence: &SynthSequence, summary: &Summary, written: &[Written]) -> Vec<(&'static str, String)> {
+fn texts(
+    sequence: &SynthSequence,
+    summary: &SynthSummary,
+    written: &[Written],
+) -> Vec<(&'static str, String)> {
     let config = sequence.config();
     let mut texts = vec![
         ("rgb.txt", image_list(sequence, "rgb", SynthSequence::timestamp)),
@@ -188,9 +192,9 @@ fn write_png(path: PathBuf, png: io::Result<Vec<u8>>) -> Result<(), SynthError> 
     Ok(write_together(&[(path, png)])?)
 }
 
-fn summarise(written: &[Written]) -> Summary {
+fn summarise(written: &[Written]) -> SynthSummary {
     let mean = written.iter().map(|frame| frame.blur.mean_px).sum::<f64>() / written.len() as f64;
-    Summary {
+    SynthSummary {
         frames: written.len(),
         mean_blur_px: mean,
         largest_p95_px: written.iter().map(|frame| frame.blur.p95_px).fold(0.0, f64::max),

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use mba_mapper::dataset::{Calibration, Readout, Vignetting};
+use mba_mapper::dataset::{Calibration, Shutter, Vignetting};
 use mba_mapper::map::MapKind;
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::run::{Run, Summary};
@@ -40,7 +40,7 @@ fn with_and_without_times(kind: MapKind) -> [f64; 2] {
     let sequence = rolling_sequence();
     let known = sequence.dataset.calibration().clone();
     assert_eq!(known.readout.readout_seconds(), Some(0.02));
-    let at_once = Calibration { readout: Readout::Global, depth_delay_seconds: Some(0.0), ..known.clone() };
+    let at_once = Calibration { readout: Shutter::Global, depth_delay_seconds: Some(0.0), ..known.clone() };
     [known, at_once].map(|known| mapped(&sequence, known, kind).map.unwrap().keyframe_psnr.unwrap())
 }
 

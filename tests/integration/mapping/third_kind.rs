@@ -2,7 +2,7 @@
 //! rendered and fitted.
 
 use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, DepthSource, FrameState, Keyframe, MapModel, PathPrior, Schedule,
+    BundleAdjustment, BundleSettings, DepthSource, FrameState, MapKeyframe, MapModel, PathPrior, Schedule,
     SeedView, StepPlan,
 };
 use mba_mapper::dataset::RgbdFrame;
@@ -94,7 +94,7 @@ impl MapModel for ColourBox {
 }
 
 /// A frame that sees every pixel with the value `byte`.
-fn keyframe(sensor: &Sensor, index: usize, byte: u8) -> Keyframe {
+fn keyframe(sensor: &Sensor, index: usize, byte: u8) -> MapKeyframe {
     let (width, height) = (CAMERA.width, CAMERA.height);
     let frame = RgbdFrame {
         index,
@@ -107,7 +107,7 @@ fn keyframe(sensor: &Sensor, index: usize, byte: u8) -> Keyframe {
         depth: vec![10_000; width * height],
     };
     let observation = ObservationPyramid::new(sensor, &frame, 2).expect("the frame has the camera's size");
-    Keyframe::new(index, observation, PathPrior { middle: RigidTransform::identity(), motion: None })
+    MapKeyframe::new(index, observation, PathPrior { middle: RigidTransform::identity(), motion: None })
 }
 
 #[test]

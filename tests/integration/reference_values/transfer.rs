@@ -5,7 +5,7 @@ use mba_tracker::image::LevelImage;
 use mba_tracker::simd::{Level, level_name, levels_up_to};
 use mba_tracker::trajectory::{ExposureTrajectory, SampleRule, left_from_right};
 use mba_tracker::transfer::{
-    BrightnessModel, PATTERN_DU, PATTERN_DV, PatchRows, PatchSite, RowTimes, TransferProblem, VirtualView,
+    BrightnessModel, PATTERN_DU, PATTERN_DV, PatchRows, PatchSite, RowDelay, TransferProblem, VirtualView,
     huber, transfer_pixel, transfer_rows,
 };
 use nalgebra::{Matrix1x6, RowSVector, SMatrix};
@@ -43,7 +43,7 @@ fn transfer_on_ramp(level: Level, vector: &ReferenceVector, ramp: &[f32]) -> Opt
         centre: [camera.cx as f32, camera.cy as f32],
         views: &views,
         brightness: BrightnessModel::default(),
-        rows: RowTimes::default(),
+        rows: RowDelay::default(),
     };
     let (u, v) = vector.pixel();
     let site = PatchSite { u: u as i16, v: v as i16, inverse_depth: (1.0 / vector.number("d")) as f32 };

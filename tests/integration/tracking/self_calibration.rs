@@ -1,6 +1,6 @@
 //! What is not on record, found from rendered sequences whose truth is known.
 
-use mba_mapper::dataset::{self, Dataset, Knowledge, Readout};
+use mba_mapper::dataset::{self, Dataset, Knowledge, Shutter};
 use mba_mapper::self_calibration::{complete, is_complete, read_back, write};
 use mba_mapper::synth::{SensorModel, SynthConfig, SynthSequence, write_dataset};
 use tempfile::TempDir;
@@ -97,5 +97,5 @@ fn a_still_camera_tells_nothing_and_is_taken_for_sharp() {
     assert!(findings.iter().all(|finding| finding.value.is_none()), "{findings:?}");
     assert_eq!(completed.calibration().sources.exposure, Knowledge::Assumed);
     assert_eq!((completed.exposure_seconds(5), readout(&completed)), (1e-4, 0.0));
-    assert!(!matches!(completed.calibration().readout, Readout::Rolling { seconds: Some(_) }));
+    assert!(!matches!(completed.calibration().readout, Shutter::Rolling { seconds: Some(_) }));
 }

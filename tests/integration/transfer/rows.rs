@@ -6,7 +6,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform, so3};
 use mba_tracker::simd::{Level, level_name, levels_up_to};
 use mba_tracker::trajectory::{BowedTrajectory, FrameTiming};
 use mba_tracker::transfer::{
-    BOWED_PATH, BowedSums, PATCH_PIXELS, PatchCost, PatchSite, RowBand, RowTimes, TransferProblem,
+    BOWED_PATH, BowedSums, PATCH_PIXELS, PatchCost, PatchSite, RowBand, RowDelay, TransferProblem,
     VirtualView, evaluate_cost, linearize, linearize_bowed,
 };
 use nalgebra::{SVector, Vector3, Vector6};
@@ -41,7 +41,7 @@ fn stepped(path: &BowedTrajectory, step: &Path) -> BowedTrajectory {
 
 fn problem<'a>(scene: &'a TransferScene, views: &'a [VirtualView], band: RowBand) -> TransferProblem<'a> {
     let step = (timing().readout / scene.camera.height as f64) as f32;
-    TransferProblem { rows: RowTimes { centre: band.centre() as f32, step }, ..scene.problem_with(views) }
+    TransferProblem { rows: RowDelay { centre: band.centre() as f32, step }, ..scene.problem_with(views) }
 }
 
 fn views_of_band(

@@ -26,7 +26,9 @@ mod components;
 mod cycles;
 mod lexer;
 mod paths;
+mod public_types;
 mod tree;
 
 pub use cycles::{Cycle, cycles};
+pub use public_types::public_types;
 pub use tree::{CrateTree, Dependency};

@@ -5,6 +5,7 @@ use std::io;
 use std::path::Path;
 
 use crate::paths::{Import, Mentions, mentions};
+use crate::public_types::public_types;
 
 /// Longest chain of re-exports that is followed; longer ones go in a circle.
 const MOST_HOPS: usize = 32;
@@ -17,6 +18,7 @@ pub(crate) type ModulePath = Vec<String>;
 pub struct CrateTree {
     name: String,
     modules: BTreeMap<ModulePath, Module>,
+    public_types: BTreeSet<String>,
 }
 
 #[derive(Clone, Debug)]
@@ -51,10 +53,17 @@ impl CrateTree {
     /// Those of reading files; a module without a file is [`io::ErrorKind::NotFound`].
     pub fn read(name: &str, sources: &Path) -> io::Result<Self> {
         let root = if sources.join("lib.rs").is_file() { "lib.rs" } else { "main.rs" };
-        let mut tree = Self { name: name.to_owned(), modules: BTreeMap::new() };
+        let mut tree =
+            Self { name: name.to_owned(), modules: BTreeMap::new(), public_types: BTreeSet::new() };
         let read = |file: &str| std::fs::read_to_string(sources.join(file)).ok();
         tree.add(Vec::new(), root, &read)?;
         Ok(tree)
+    }
+
+    /// Names of the public types of all files, see [`public_types`](crate::public_types).
+    #[must_use]
+    pub fn public_types(&self) -> &BTreeSet<String> {
+        &self.public_types
     }
 
     /// The crate of such sources: file names relative to the folder of `lib.rs`, which is the first, and their texts.
@@ -63,7 +72,8 @@ impl CrateTree {
     /// Where a module has no file.
     #[must_use]
     pub fn from_sources(name: &str, sources: &[(&str, &str)]) -> Self {
-        let mut tree = Self { name: name.to_owned(), modules: BTreeMap::new() };
+        let mut tree =
+            Self { name: name.to_owned(), modules: BTreeMap::new(), public_types: BTreeSet::new() };
         let read =
             |file: &str| sources.iter().find(|(name, _)| *name == file).map(|(_, text)| (*text).to_owned());
         tree.add(Vec::new(), sources[0].0, &read).expect("every module has a file");
@@ -79,7 +89,9 @@ impl CrateTree {
     /// Adds a module and those below it.
     fn add(&mut self, path: ModulePath, file: &str, read: &dyn Fn(&str) -> Option<String>) -> io::Result<()> {
         let missing = || io::Error::new(io::ErrorKind::NotFound, format!("{}: no file {file}", self.name));
-        let mentions = mentions(&read(file).ok_or_else(missing)?);
+        let source = read(file).ok_or_else(missing)?;
+        self.public_types.extend(public_types(&source));
+        let mentions = mentions(&source);
         let children = mentions.children.clone();
         self.modules.insert(path.clone(), Module { file: file.to_owned(), mentions });
         for child in children {

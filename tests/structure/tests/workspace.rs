@@ -1,5 +1,6 @@
 //! The crates of this workspace have no cycles: neither between files nor between the modules of any folder.
 
+use std::collections::BTreeMap;
 use std::fs::read_to_string;
 use std::path::Path;
 
@@ -14,15 +15,30 @@ fn members(root: &Path) -> Vec<String> {
     names.filter(|name| root.join(name).join("src/lib.rs").is_file()).collect()
 }
 
-#[test]
-fn no_crate_has_a_cycle() {
+fn crates() -> Vec<CrateTree> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let members = members(&root);
     assert!(members.len() >= 10, "{members:?}");
-    let mut found = String::new();
-    for member in &members {
-        let tree = CrateTree::read(member, &root.join(member).join("src")).expect("the sources can be read");
-        found.extend(cycles(&tree).iter().map(ToString::to_string));
-    }
+    let read = |name: &String| CrateTree::read(name, &root.join(name).join("src"));
+    members.iter().map(|name| read(name).expect("the sources can be read")).collect()
+}
+
+#[test]
+fn no_crate_has_a_cycle() {
+    let found: String = crates().iter().flat_map(cycles).map(|cycle| cycle.to_string()).collect();
     assert!(found.is_empty(), "\n{found}");
+}
+
+#[test]
+fn a_name_of_a_type_has_one_owner() {
+    let mut owners = BTreeMap::<String, Vec<String>>::new();
+    // What only tests and benches use is not met together with the rest.
+    let is_product = |tree: &&CrateTree| !(tree.name().starts_with("tests") || tree.name() == "benches");
+    for tree in crates().iter().filter(is_product) {
+        for name in tree.public_types() {
+            owners.entry(name.clone()).or_default().push(tree.name().to_owned());
+        }
+    }
+    owners.retain(|_, owners| owners.len() > 1);
+    assert!(owners.is_empty(), "{owners:#?}");
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use image::ImageEncoder;
-use mba_mapper::dataset::{self, Dataset, DatasetError, FrameError, Readout, Response};
+use mba_mapper::dataset::{self, Dataset, DatasetError, FrameReadError, Response, Shutter};
 
 use crate::folder::{Folder, HEIGHT, WIDTH, colour_image};
 
@@ -24,9 +24,9 @@ fn a_damaged_frame_is_an_error_of_that_frame_only() {
 
     folder.write("rgb/0.png", "this is no image");
     let no_image = dataset.frame(0).unwrap_err();
-    assert!(matches!(no_image, FrameError::Damaged { .. }), "{no_image}");
+    assert!(matches!(no_image, FrameReadError::Damaged { .. }), "{no_image}");
     folder.write("depth/2.png", "");
-    assert!(matches!(dataset.frame(2).unwrap_err(), FrameError::Damaged { .. }));
+    assert!(matches!(dataset.frame(2).unwrap_err(), FrameReadError::Damaged { .. }));
 }
 
 #[test]
@@ -272,7 +272,7 @@ fn assumptions_about_the_camera_are_reported() {
     }
     let calibration = folder.open().calibration().clone();
     assert!((calibration.frame_rate - 30.0).abs() < 0.01);
-    assert_eq!((calibration.response, calibration.readout), (Response::Srgb, Readout::Global));
+    assert_eq!((calibration.response, calibration.readout), (Response::Srgb, Shutter::Global));
     assert_eq!(
         folder.warnings(),
         [

@@ -3,7 +3,7 @@
 use std::fs;
 
 use mba_mapper::dataset::{
-    self, CalibrationSources, DatasetError, ExposureSource, Knowledge, Readout, Response, Vignetting,
+    self, CalibrationSources, DatasetError, ExposureSource, Knowledge, Response, Shutter, Vignetting,
 };
 use nalgebra::Vector3;
 
@@ -15,19 +15,19 @@ fn with_keys(keys: &str) -> Folder {
     folder
 }
 
-fn readout(keys: &str) -> Readout {
+fn readout(keys: &str) -> Shutter {
     with_keys(keys).open().calibration().readout
 }
 
 #[test]
 fn readout_is_global_rolling_or_rolling_in_a_known_time() {
-    let rolling = |seconds| Readout::Rolling { seconds };
+    let rolling = |seconds| Shutter::Rolling { seconds };
     assert_eq!(readout("readout = \"rolling\"\n"), rolling(None));
     assert_eq!(readout("readout = \"rolling\"\nreadout_seconds = 0.02\n"), rolling(Some(0.02)));
     assert_eq!(readout("readout_seconds = -0.03\n"), rolling(Some(-0.03)), "the last row first");
-    assert_eq!(readout("readout_seconds = 0\n"), Readout::Global);
-    assert_eq!(readout("readout = \"global\"\nreadout_seconds = 0\n"), Readout::Global);
-    let times = [Readout::Global, rolling(None), rolling(Some(0.02))].map(Readout::readout_seconds);
+    assert_eq!(readout("readout_seconds = 0\n"), Shutter::Global);
+    assert_eq!(readout("readout = \"global\"\nreadout_seconds = 0\n"), Shutter::Global);
+    let times = [Shutter::Global, rolling(None), rolling(Some(0.02))].map(Shutter::readout_seconds);
     assert_eq!(times, [Some(0.0), None, Some(0.02)]);
 }
 

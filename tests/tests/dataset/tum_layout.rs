@@ -3,7 +3,7 @@
 use std::fs;
 
 use image::{DynamicImage, ImageBuffer, ImageFormat, Luma, Rgb};
-use mba_mapper::dataset::{self, ExposureSource, OpenOptions, Readout, Response, TimedPose};
+use mba_mapper::dataset::{self, ExposureSource, OpenOptions, Response, Shutter, TimedPose};
 
 use crate::folder::{Folder, HEIGHT, WIDTH, colour_image};
 
@@ -17,7 +17,7 @@ fn frames_come_as_stored_when_there_is_no_distortion() {
     assert_eq!(calibration.camera.fy, 7.5);
     assert_eq!(calibration.depth_scale, 5000.0);
     assert_eq!(calibration.exposure, ExposureSource::Constant { seconds: 0.016 });
-    assert_eq!((&calibration.response, calibration.readout), (&Response::Linear, Readout::Global));
+    assert_eq!((&calibration.response, calibration.readout), (&Response::Linear, Shutter::Global));
 
     let frame = dataset.frame(1).unwrap();
     assert_eq!((frame.index, frame.width, frame.height), (1, 8, 6));
@@ -134,7 +134,7 @@ fn freiburg_sequences_need_no_calibration() {
         let calibration = dataset.calibration();
         assert_eq!((calibration.camera.fx, calibration.distortion.k1), (fx, k1));
         assert_eq!((calibration.depth_scale, calibration.frame_rate), (5000.0, 30.0));
-        assert_eq!(calibration.readout, Readout::Rolling { seconds: None });
+        assert_eq!(calibration.readout, Shutter::Rolling { seconds: None });
         assert!((dataset.exposure_seconds(0) - 0.5 / 30.0).abs() < 1e-12);
         assert_eq!(folder.warnings().len(), 2);
         assert!(folder.warnings()[0].starts_with("no calibration.toml, using the published"));

@@ -7,7 +7,7 @@ use super::Estimate;
 use super::problem::Objective;
 use crate::trajectory::BowedTrajectory;
 use crate::transfer::{
-    MAX_BANDS, MAX_VIRTUAL_VIEWS, PatchSite, RowBand, RowTimes, TransferParts, TransferProblem, VirtualView,
+    MAX_BANDS, MAX_VIRTUAL_VIEWS, PatchSite, RowBand, RowDelay, TransferParts, TransferProblem, VirtualView,
 };
 
 /// The bands of rows of a frame at an estimate, those without any patch left out.
@@ -60,7 +60,7 @@ impl TransferParts for Bands<'_> {
             if !sites.is_empty() {
                 band.fill_views(&self.path, &frame.timing, views, &camera, inverse_depth, &mut self.views);
                 let step = (frame.timing.readout / height as f64) as f32;
-                let rows = RowTimes { centre: band.centre() as f32, step };
+                let rows = RowDelay { centre: band.centre() as f32, step };
                 return Some((self.objective.transfer_problem(self.estimate, &self.views, rows), sites));
             }
         }

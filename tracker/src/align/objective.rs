@@ -12,7 +12,7 @@ use super::{BOWED_UNKNOWNS, Estimate, UNKNOWNS};
 use crate::geometry::RigidTransform;
 use crate::trajectory::{BowedTrajectory, SampleRule};
 use crate::transfer::{
-    self, BOWED_PATH, LINEAR_PATH, MAX_BANDS, PatchCost, PatchSite, ROW_LENGTH, RowBand, RowTimes,
+    self, BOWED_PATH, LINEAR_PATH, MAX_BANDS, PatchCost, PatchSite, ROW_LENGTH, RowBand, RowDelay,
     TransferParts, TransferProblem, virtual_views,
 };
 use crate::work::Work;
@@ -154,6 +154,7 @@ impl Objective<'_> {
             depth_compared: 0.0,
         };
         if self.frame.timing.reaches_outside() {
+            // Rows at times of their own: bands with views of their own, a path with bow.
             let mut bands = Bands::new(self, estimate, self.sites);
             let all = transfer::linearize_bowed(self.simd, &mut bands, self.sites, &self.model, costs);
             sums.cost = all.cost;
@@ -166,6 +167,7 @@ impl Objective<'_> {
             }
             return sums;
         }
+        // All rows at once: one set of views for all patches; the bow has no share.
         self.for_each_band(estimate, self.sites, |problem, _| {
             let all = transfer::linearize(self.simd, problem, self.sites, &self.model, costs);
             sums.cost = all.cost;
@@ -188,7 +190,7 @@ impl Objective<'_> {
         if !timing.reaches_outside() {
             let path = &estimate.keyframe_from_camera;
             let views = virtual_views(path, self.views, SampleRule::Midpoint, &self.camera);
-            return visit(&self.transfer_problem(estimate, &views, RowTimes::default()), 0..sites.len());
+            return visit(&self.transfer_problem(estimate, &views, RowDelay::default()), 0..sites.len());
         }
         let mut bands = Bands::new(self, estimate, sites);
         while let Some((problem, of_band)) = bands.next_part() {

@@ -11,7 +11,7 @@ use crate::keyframe::Keypoint;
 use crate::surface::{InverseDepthMap, SurfacePlanes};
 use crate::trajectory::FrameTiming;
 use crate::transfer::{
-    BrightnessModel, PatchCost, PatchSite, ResidualModel, RowTimes, TransferProblem, VirtualView,
+    BrightnessModel, PatchCost, PatchSite, ResidualModel, RowDelay, TransferProblem, VirtualView,
 };
 
 /// The sharp reference that a frame is aligned with.
@@ -89,7 +89,7 @@ impl Objective<'_> {
         &'b self,
         estimate: &Estimate,
         views: &'b [VirtualView],
-        rows: RowTimes,
+        rows: RowDelay,
     ) -> TransferProblem<'b> {
         TransferProblem {
             reference: self.reference.levels[self.level].image(),

@@ -37,7 +37,7 @@ pub struct BundleSettings {
 
 /// A frame that the map is fitted to.
 #[derive(Clone, Debug)]
-pub struct Keyframe {
+pub struct MapKeyframe {
     /// Index in the data set.
     pub index: usize,
     /// What was captured.
@@ -50,7 +50,7 @@ pub struct Keyframe {
     pub metric: PathMetric,
 }
 
-impl Keyframe {
+impl MapKeyframe {
     /// Frame `index` of the data set.
     #[must_use]
     pub fn new(index: usize, observation: ObservationPyramid, prior: PathPrior) -> Self {
@@ -80,7 +80,7 @@ pub struct BundleState<M = SceneMap> {
 pub struct BundleAdjustment<M: MapModel = SceneMap> {
     /// What was estimated so far.
     pub state: BundleState<M>,
-    pub(super) keyframes: Vec<Keyframe>,
+    pub(super) keyframes: Vec<MapKeyframe>,
     settings: BundleSettings,
     schedule: Schedule,
     sensor: Sensor,
@@ -116,7 +116,7 @@ impl BundleAdjustment {
         level: Level,
         sensor: Sensor,
         settings: BundleSettings,
-        keyframes: Vec<Keyframe>,
+        keyframes: Vec<MapKeyframe>,
         frames: Vec<FrameState>,
     ) -> Self {
         let map = SceneMap::new(settings.kind, settings.seed);
@@ -137,7 +137,7 @@ impl<M: MapModel> BundleAdjustment<M> {
         level: Level,
         sensor: Sensor,
         settings: BundleSettings,
-        frames: Vec<(Keyframe, FrameState)>,
+        frames: Vec<(MapKeyframe, FrameState)>,
     ) -> Self {
         let (keyframes, frames) = frames.into_iter().unzip();
         let state = BundleState { map, frames, steps: 0, scheduled_steps: 0, position: 0.0 };
@@ -147,7 +147,7 @@ impl<M: MapModel> BundleAdjustment<M> {
 
     /// The keyframes.
     #[must_use]
-    pub fn keyframes(&self) -> &[Keyframe] {
+    pub fn keyframes(&self) -> &[MapKeyframe] {
         &self.keyframes
     }
 
@@ -164,13 +164,13 @@ impl<M: MapModel> BundleAdjustment<M> {
     }
 
     /// Adds a keyframe with a first estimate of its state, the last in order.
-    pub fn push(&mut self, keyframe: Keyframe, frame: FrameState) {
+    pub fn push(&mut self, keyframe: MapKeyframe, frame: FrameState) {
         self.keyframes.push(keyframe);
         self.state.frames.push(frame);
     }
 
     /// Takes keyframe `k` out; what the map learnt from it stays. Returns `None` if there is no such keyframe.
-    pub fn remove_keyframe(&mut self, k: usize) -> Option<(Keyframe, FrameState)> {
+    pub fn remove_keyframe(&mut self, k: usize) -> Option<(MapKeyframe, FrameState)> {
         let both = k < self.keyframes.len().min(self.state.frames.len());
         both.then(|| (self.keyframes.remove(k), self.state.frames.remove(k)))
     }
@@ -216,7 +216,7 @@ impl<M: MapModel> BundleAdjustment<M> {
     pub fn seed_from(&mut self, k: usize, source: DepthSource) {
         let FrameState { path, log_gain, .. } = &self.state.frames[k];
         let (world_from_camera, gain) = (path.mid(), log_gain.exp() as f32);
-        let Keyframe { index, observation, .. } = &self.keyframes[k];
+        let MapKeyframe { index, observation, .. } = &self.keyframes[k];
         let seen = seen_at_once(observation.level(0), path);
         let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
         self.state.map.seed(&mut self.context, &view, self.settings.max_gaussians);
@@ -292,7 +292,7 @@ impl<M: MapModel> BundleAdjustment<M> {
     /// Fits path and gain of a frame that is no keyframe to the map as it is. `count` steps on the coarser resolution, of
     /// which the one with the least loss is kept: steps have a length of their own, and would lead away from a path
     /// that is right already.
-    pub fn fit_frame(&mut self, unmapped: &Keyframe, frame: &mut FrameState, count: usize) {
+    pub fn fit_frame(&mut self, unmapped: &MapKeyframe, frame: &mut FrameState, count: usize) {
         let plan = StepPlan { level: 1, spacing: 2.0, path_pixels: 0.3, ..self.schedule.plan(0.1, false) };
         // The same pixels at every step: their losses can be compared.
         let draw = FITS_FROM + unmapped.index as u64;
@@ -381,7 +381,7 @@ struct ViewCount {
 
 impl BundleSettings {
     /// Virtual views of a frame for a step with `plan`.
-    fn view_count(&self, keyframe: &Keyframe, frame: &FrameState, plan: &StepPlan) -> ViewCount {
+    fn view_count(&self, keyframe: &MapKeyframe, frame: &FrameState, plan: &StepPlan) -> ViewCount {
         let Observation { camera, times, .. } = keyframe.observation.level(plan.level);
         let blur_px = frame.blur_px(camera, keyframe.depth, times.exposure);
         let views = self.views(blur_px, plan);

@@ -26,7 +26,7 @@ mod seeding;
 mod smooth_depth;
 mod world_moves;
 
-pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, Keyframe, StepReport};
+pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, MapKeyframe, StepReport};
 pub use brightness::{NOTICEABLE, Placed, log_brightness};
 pub use field_map::FieldMap;
 pub use frame_state::FrameState;

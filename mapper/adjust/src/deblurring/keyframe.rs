@@ -1,6 +1,6 @@
 //! Deblurring one colour image with the motion that was estimated for it.
 
-use mba_io::dataset::{FrameError, RgbdFrame};
+use mba_io::dataset::{FrameReadError, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::deblur::DeblurScratch;
 use mba_tracker::geometry::PinholeCamera;
@@ -32,7 +32,7 @@ const FALLBACK_INVERSE_DEPTH: f32 = 0.5;
 pub enum DeblurError {
     /// The frame cannot be read.
     #[error(transparent)]
-    Unreadable(#[from] FrameError),
+    Unreadable(#[from] FrameReadError),
     /// The frame does not have the size of the camera's images.
     #[error("the image has {} x {} pixels, the camera {} x {}", .found.0, .found.1, .expected.0, .expected.1)]
     Size {

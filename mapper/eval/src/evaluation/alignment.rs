@@ -12,7 +12,7 @@ const RANK_TOLERANCE: f64 = 1e-14;
 
 /// Which freedom the estimate is given before it is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Alignment {
+pub enum TrajectoryAlignment {
     /// Compare coordinates as they are.
     None,
     /// Rotation and translation (`evo_ape -a`).
@@ -91,17 +91,17 @@ impl Similarity {
 /// equations 34 to 43). Never a reflection.
 ///
 /// # Errors
-/// See [`AlignmentError`]; [`Alignment::None`] always succeeds.
+/// See [`AlignmentError`]; [`TrajectoryAlignment::None`] always succeeds.
 ///
 /// # Panics
 /// When the lists differ in length.
 pub fn align(
     reference: &[Vector3<f64>],
     estimate: &[Vector3<f64>],
-    alignment: Alignment,
+    alignment: TrajectoryAlignment,
 ) -> Result<Similarity, AlignmentError> {
     assert_eq!(reference.len(), estimate.len(), "points to align come in pairs");
-    if alignment == Alignment::None {
+    if alignment == TrajectoryAlignment::None {
         return Ok(Similarity::identity());
     }
     check_points(reference, estimate)?;
@@ -113,7 +113,9 @@ pub fn align(
     let covariance = pairs().map(|(x, y)| x * y.transpose()).sum::<Matrix3<f64>>() / count;
     let (rotation, scaled_trace) = nearest_rotation(&covariance)?;
     let scale = match alignment {
-        Alignment::Sim3 => scaled_trace / (pairs().map(|(_, y)| y.norm_squared()).sum::<f64>() / count),
+        TrajectoryAlignment::Sim3 => {
+            scaled_trace / (pairs().map(|(_, y)| y.norm_squared()).sum::<f64>() / count)
+        }
         _ => 1.0,
     };
     Ok(Similarity { scale, rotation, translation: reference_mean - rotation * estimate_mean * scale })
@@ -175,7 +177,7 @@ mod tests {
     #[test]
     fn recovers_a_known_similarity() {
         let reference: Vec<_> = points().iter().map(|p| known().transform_point(p)).collect();
-        assert_close(&align(&reference, &points(), Alignment::Sim3).unwrap(), &known());
+        assert_close(&align(&reference, &points(), TrajectoryAlignment::Sim3).unwrap(), &known());
     }
 
     #[test]
@@ -183,13 +185,13 @@ mod tests {
         let planar: Vec<_> = points().iter().map(|p| Vector3::new(p.x, p.y, 0.0)).collect();
         let rigid = Similarity { scale: 1.0, ..known() };
         let reference: Vec<_> = planar.iter().map(|p| rigid.transform_point(p)).collect();
-        assert_close(&align(&reference, &planar, Alignment::Se3).unwrap(), &rigid);
+        assert_close(&align(&reference, &planar, TrajectoryAlignment::Se3).unwrap(), &rigid);
     }
 
     #[test]
     fn a_mirrored_list_is_answered_by_a_rotation() {
         let mirrored: Vec<_> = points().iter().map(|p| Vector3::new(p.x, p.y, -p.z)).collect();
-        let found = align(&mirrored, &points(), Alignment::Se3).unwrap();
+        let found = align(&mirrored, &points(), TrajectoryAlignment::Se3).unwrap();
         assert!((found.rotation.to_rotation_matrix().matrix().determinant() - 1.0).abs() < 1e-12);
     }
 
@@ -197,12 +199,15 @@ mod tests {
     fn undetermined_cases_are_errors() {
         let line: Vec<_> = (0..9).map(|k| Vector3::new(0.3, -0.7, 1.1) * f64::from(k)).collect();
         let spot = vec![Vector3::new(1.0, 2.0, 3.0); 5];
-        assert_eq!(align(&line, &line, Alignment::Se3), Err(AlignmentError::Degenerate));
-        assert_eq!(align(&points(), &spot, Alignment::Sim3), Err(AlignmentError::Degenerate));
+        assert_eq!(align(&line, &line, TrajectoryAlignment::Se3), Err(AlignmentError::Degenerate));
+        assert_eq!(align(&points(), &spot, TrajectoryAlignment::Sim3), Err(AlignmentError::Degenerate));
         let two = &points()[..2];
-        assert_eq!(align(two, two, Alignment::Se3), Err(AlignmentError::TooFewPoints { found: 2 }));
+        assert_eq!(align(two, two, TrajectoryAlignment::Se3), Err(AlignmentError::TooFewPoints { found: 2 }));
         let mut broken = points();
         broken[3].y = f64::NAN;
-        assert_eq!(align(&points(), &broken, Alignment::Se3), Err(AlignmentError::NotFinite { index: 3 }));
+        assert_eq!(
+            align(&points(), &broken, TrajectoryAlignment::Se3),
+            Err(AlignmentError::NotFinite { index: 3 })
+        );
     }
 }

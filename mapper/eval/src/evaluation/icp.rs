@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::kd_tree::{KdTree, distance};
-use super::{Alignment, align};
+use super::{TrajectoryAlignment, align};
 
 /// Points of the estimate that take part.
 const POINTS: usize = 50_000;
@@ -40,7 +40,7 @@ pub fn refine_by_icp(reference: &[[f32; 3]], estimate: &[[f32; 3]], reach: f64) 
         let pairs: Vec<Option<_>> = points.par_iter().map(pair).collect();
         let (targets, sources): (Vec<_>, Vec<_>) = pairs.into_iter().flatten().unzip();
         // 2. The motion that takes all points to their neighbours at once, from where they started.
-        let Ok(found) = align(&targets, &sources, Alignment::Se3) else { break };
+        let Ok(found) = align(&targets, &sources, TrajectoryAlignment::Se3) else { break };
         let next = RigidTransform { rotation: found.rotation, translation: found.translation };
         let moved = reference_from_estimate.tangent_to(&next).norm();
         reference_from_estimate = next;

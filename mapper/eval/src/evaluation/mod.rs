@@ -15,7 +15,7 @@ mod pose_alignment;
 mod surface;
 mod trajectory;
 
-pub use alignment::{Alignment, AlignmentError, Similarity, align};
+pub use alignment::{AlignmentError, Similarity, TrajectoryAlignment, align};
 pub use association::{DEFAULT_MAX_DT, Match, associate};
 pub use exposure::{BlurEvaluation, BlurFrame, MIN_TRUE_BLUR_PX, evaluate_blur};
 pub use figures::{BlurFigures, TrajectoryFigures};

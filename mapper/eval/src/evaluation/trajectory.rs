@@ -7,7 +7,7 @@ use thiserror::Error;
 use mba_io::statistics::{Statistics, share_within};
 use mba_io::trajectory_file::TimedPose;
 
-use super::{Alignment, AlignmentError, DEFAULT_MAX_DT, Match, Similarity, align, associate};
+use super::{AlignmentError, DEFAULT_MAX_DT, Match, Similarity, TrajectoryAlignment, align, associate};
 
 /// A frame whose position error is at most this many metres counts as good: one bad frame can decide an RMSE, it
 /// cannot decide this share.
@@ -17,14 +17,14 @@ pub const GOOD_FRAME_METRES: f64 = 0.02;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrajectoryOptions {
     /// Freedom given to the estimate.
-    pub alignment: Alignment,
+    pub alignment: TrajectoryAlignment,
     /// Largest time difference of a matched pair, seconds.
     pub max_dt: f64,
 }
 
 impl Default for TrajectoryOptions {
     fn default() -> Self {
-        Self { alignment: Alignment::Se3, max_dt: DEFAULT_MAX_DT }
+        Self { alignment: TrajectoryAlignment::Se3, max_dt: DEFAULT_MAX_DT }
     }
 }
 
@@ -153,7 +153,7 @@ mod tests {
         corners.iter().enumerate().map(pose).collect()
     }
 
-    fn evaluate(estimate: &[TimedPose], alignment: Alignment) -> TrajectoryEvaluation {
+    fn evaluate(estimate: &[TimedPose], alignment: TrajectoryAlignment) -> TrajectoryEvaluation {
         evaluate_trajectory(&square(), estimate, &TrajectoryOptions { alignment, max_dt: 0.01 }).unwrap()
     }
 
@@ -166,7 +166,7 @@ mod tests {
         for (k, pose) in estimate.iter_mut().enumerate() {
             pose.world_from_camera.translation.z = if k % 2 == 0 { h } else { -h };
         }
-        let e = evaluate(&estimate, Alignment::Se3);
+        let e = evaluate(&estimate, TrajectoryAlignment::Se3);
         for figure in [e.ate.rmse, e.ate.mean, e.ate.median, e.ate.min, e.ate.max] {
             assert!((figure - h).abs() < 1e-12, "{figure}");
         }
@@ -184,10 +184,10 @@ mod tests {
         for pose in &mut estimate {
             pose.world_from_camera.translation *= 1.2;
         }
-        let rigid = evaluate(&estimate, Alignment::Se3);
+        let rigid = evaluate(&estimate, TrajectoryAlignment::Se3);
         assert!((rigid.ate.rmse - 0.1 * 2f64.sqrt()).abs() < 1e-12);
         assert!((rigid.rpe_translation.median - 0.2).abs() < 1e-12);
-        let scaled = evaluate(&estimate, Alignment::Sim3);
+        let scaled = evaluate(&estimate, TrajectoryAlignment::Sim3);
         assert!(scaled.ate.max < 1e-12);
         assert!((scaled.reference_from_estimate.scale - 1.0 / 1.2).abs() < 1e-12);
         assert!(scaled.rpe_translation.max < 1e-12);
@@ -199,8 +199,8 @@ mod tests {
         for pose in &mut estimate {
             pose.world_from_camera.translation += Vector3::new(0.0, 0.3, 0.4);
         }
-        assert!((evaluate(&estimate, Alignment::None).ate.mean - 0.5).abs() < 1e-12);
-        assert!(evaluate(&estimate, Alignment::Se3).ate.max < 1e-12);
+        assert!((evaluate(&estimate, TrajectoryAlignment::None).ate.mean - 0.5).abs() < 1e-12);
+        assert!(evaluate(&estimate, TrajectoryAlignment::Se3).ate.max < 1e-12);
     }
 
     #[test]
@@ -210,7 +210,7 @@ mod tests {
         for (k, pose) in estimate.iter_mut().enumerate() {
             pose.world_from_camera.rotation = so3::exp(&Vector3::new(0.0, 0.0, 0.02 * k as f64));
         }
-        let e = evaluate(&estimate, Alignment::None);
+        let e = evaluate(&estimate, TrajectoryAlignment::None);
         assert_eq!(e.ate.max, 0.0);
         assert!((e.rpe_rotation.mean - 0.02).abs() < 1e-12 && e.rpe_rotation.std < 1e-12);
     }
@@ -220,7 +220,7 @@ mod tests {
         let mut estimate = square();
         estimate.remove(1);
         estimate.push(TimedPose { timestamp: 77.0, ..estimate[0] });
-        let e = evaluate(&estimate, Alignment::None);
+        let e = evaluate(&estimate, TrajectoryAlignment::None);
         assert_eq!((e.reference_coverage, e.estimate_coverage), (0.75, 0.75));
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mba_io::FileError;
-use mba_io::dataset::FrameError;
+use mba_io::dataset::FrameReadError;
 
 use crate::evaluation::ImageError;
 
@@ -16,7 +16,7 @@ pub enum ImageFolderError {
     Folder(#[from] FileError),
     /// An image, or the captured frame, cannot be read.
     #[error(transparent)]
-    Image(#[from] FrameError),
+    Image(#[from] FrameReadError),
     /// No name occurs in both folders.
     #[error(
         "{reference} ({reference_images} images) and {estimate} ({estimate_images}) have no name in common"

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use image::{ColorType, DynamicImage};
 
 use mba_io::FileError;
-use mba_io::dataset::{FrameError, read_image};
+use mba_io::dataset::{FrameReadError, read_image};
 
 /// An image as it is compared.
 pub(super) struct StoredImage {
@@ -26,7 +26,7 @@ pub(super) enum Pixels {
 }
 
 impl StoredImage {
-    pub(super) fn read(path: &Path) -> Result<Self, FrameError> {
+    pub(super) fn read(path: &Path) -> Result<Self, FrameReadError> {
         let image = read_image(path)?;
         let size = [image.width() as usize, image.height() as usize];
         let pixels = match image.color() {

@@ -24,7 +24,7 @@ pub struct Calibration {
     /// How the stored values follow from light.
     pub response: Response,
     /// How the colour sensor is read out.
-    pub readout: Readout,
+    pub readout: Shutter,
     /// Time from the exposure of the first row of depth to that of the last, seconds; negative when the last row
     /// comes first, 0 when all are measured together.
     pub depth_readout_seconds: f64,
@@ -104,7 +104,7 @@ impl Response {
 
 /// How a sensor is read out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Readout {
+pub enum Shutter {
     /// All rows are exposed at the same time.
     Global,
     /// Rows are exposed one after the other; the timestamp is that of the middle of the image.
@@ -115,7 +115,7 @@ pub enum Readout {
     },
 }
 
-impl Readout {
+impl Shutter {
     /// Time from the exposure of the first row to that of the last, seconds, 0 for a global shutter; none for rows
     /// that are exposed one after the other in an unknown time.
     #[must_use]
@@ -179,7 +179,7 @@ impl Calibration {
             exposure: ExposureSource::Assumed { seconds: assumed_exposure_seconds(frame_rate) },
             frame_rate,
             response: Response::Srgb,
-            readout: Readout::Global,
+            readout: Shutter::Global,
             depth_readout_seconds: 0.0,
             depth_delay_seconds: None,
             depth_clock_seconds: 0.0,
@@ -191,7 +191,7 @@ impl Calibration {
 
     /// The same camera with a rolling shutter that is on record without its time.
     pub(super) fn rolling(mut self) -> Self {
-        self.readout = Readout::Rolling { seconds: None };
+        self.readout = Shutter::Rolling { seconds: None };
         self.sources.readout = Knowledge::Recorded;
         self
     }

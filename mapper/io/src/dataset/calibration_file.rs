@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::calibration::{InvalidValue, ROTATION, rotation_of};
 use super::{
-    Calibration, CalibrationSources, CameraFact, DatasetError, ExposureSource, Knowledge, Readout, Response,
+    Calibration, CalibrationSources, CameraFact, DatasetError, ExposureSource, Knowledge, Response, Shutter,
     Vignetting, Warning, response_table,
 };
 use crate::whole_file::read_text;
@@ -160,19 +160,19 @@ fn is_depth_timed(keys: &Keys) -> bool {
 
 /// The readout of two keys that must not contradict each other; a time alone says that rows are exposed one after
 /// the other.
-fn readout(keys: &Keys, warnings: &mut Vec<Warning>) -> Result<Readout, InvalidValue> {
+fn readout(keys: &Keys, warnings: &mut Vec<Warning>) -> Result<Shutter, InvalidValue> {
     match (&keys.readout, keys.readout_seconds) {
-        (Some(ReadoutKey::Rolling), seconds) => Ok(Readout::Rolling { seconds }),
+        (Some(ReadoutKey::Rolling), seconds) => Ok(Shutter::Rolling { seconds }),
         (Some(ReadoutKey::Global), Some(seconds)) if seconds != 0.0 => Err(InvalidValue {
             key: "readout_seconds",
             value: seconds.to_string(),
             expected: "0 or nothing with readout = \"global\"",
         }),
-        (Some(ReadoutKey::Global), _) | (None, Some(0.0)) => Ok(Readout::Global),
-        (None, Some(seconds)) => Ok(Readout::Rolling { seconds: Some(seconds) }),
+        (Some(ReadoutKey::Global), _) | (None, Some(0.0)) => Ok(Shutter::Global),
+        (None, Some(seconds)) => Ok(Shutter::Rolling { seconds: Some(seconds) }),
         (None, None) => {
             warnings.push(Warning::Assumed { key: "readout", value: "\"global\"".into() });
-            Ok(Readout::Global)
+            Ok(Shutter::Global)
         }
     }
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 
 use super::{
-    Calibration, CalibrationSources, CameraFact, ExposureSource, Knowledge, Readout, Response, Vignetting,
+    Calibration, CalibrationSources, CameraFact, ExposureSource, Knowledge, Response, Shutter, Vignetting,
     response_table,
 };
 use crate::FileError;
@@ -87,8 +87,8 @@ impl Lines {
         self.add("frame_rate", calibration.frame_rate);
         match calibration.readout {
             _ if calibration.sources.readout == Knowledge::Assumed => (),
-            Readout::Global => self.add("readout", "global"),
-            Readout::Rolling { seconds } => {
+            Shutter::Global => self.add("readout", "global"),
+            Shutter::Rolling { seconds } => {
                 self.add("readout", "rolling");
                 seconds.into_iter().for_each(|seconds| self.add("readout_seconds", seconds));
             }
@@ -146,7 +146,7 @@ mod tests {
         calibration.distortion = Distortion { k1: 0.2624, k2: -0.4531, p1: -0.0054, p2: 0.1 + 0.2, k3: 1e-7 };
         calibration.exposure = ExposureSource::Constant { seconds: 1.0 / 61.0 };
         calibration.response = Response::Table(Box::new(InverseResponse::from_table(&table).unwrap()));
-        calibration.readout = Readout::Rolling { seconds: Some(-0.02 / 3.0) };
+        calibration.readout = Shutter::Rolling { seconds: Some(-0.02 / 3.0) };
         calibration.depth_readout_seconds = 0.03 / 7.0;
         calibration.depth_delay_seconds = Some(-0.011);
         calibration.vignetting = Vignetting { a2: -0.35, a4: 0.05 };
@@ -161,7 +161,7 @@ mod tests {
             depth_delay: Knowledge::Recorded,
         };
         assert_eq!(written_and_read(&calibration), calibration);
-        calibration.readout = Readout::Global;
+        calibration.readout = Shutter::Global;
         calibration.response = Response::Linear;
         (calibration.depth_delay_seconds, calibration.depth_clock_seconds) = (None, -0.0207);
         calibration.sources.readout = Knowledge::Recorded;

@@ -138,7 +138,7 @@ pub enum DatasetError {
 /// One frame cannot be used; others may be fine, so a caller skips it, counts it and goes on.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
-pub enum FrameError {
+pub enum FrameReadError {
     /// There is no such frame.
     #[error("frame {index} does not exist, the data set has {len}")]
     IndexOutOfRange {

@@ -8,7 +8,7 @@ use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::jpeg_scan::check_scans;
-use super::{FrameError, MAX_PIXELS};
+use super::{FrameReadError, MAX_PIXELS};
 use crate::FileError;
 use crate::whole_file::read_at_most;
 
@@ -47,15 +47,15 @@ impl RgbdFrame {
 }
 
 /// Decodes a colour image of `size` (width, height) into interleaved 8-bit RGB.
-pub(super) fn read_colour(path: &Path, size: (usize, usize)) -> Result<Vec<u8>, FrameError> {
+pub(super) fn read_colour(path: &Path, size: (usize, usize)) -> Result<Vec<u8>, FrameReadError> {
     Ok(decode(path, size, |_| Ok(()))?.into_rgb8().into_raw())
 }
 
 /// Decodes a 16-bit depth image of `size` (width, height).
-pub(super) fn read_depth(path: &Path, size: (usize, usize)) -> Result<Vec<u16>, FrameError> {
+pub(super) fn read_depth(path: &Path, size: (usize, usize)) -> Result<Vec<u16>, FrameReadError> {
     let check = |colour_type| match colour_type {
         ColorType::L16 => Ok(()),
-        other => Err(FrameError::DepthFormat { path: path.to_owned(), found: format!("{other:?}") }),
+        other => Err(FrameReadError::DepthFormat { path: path.to_owned(), found: format!("{other:?}") }),
     };
     Ok(decode(path, size, check)?.into_luma16().into_raw())
 }
@@ -112,12 +112,14 @@ pub(super) fn header(path: &Path) -> Option<ImageHeader> {
 ///
 /// # Errors
 ///
-/// [`FrameError`] if it is missing, damaged or too large.
-pub fn read_image(path: &Path) -> Result<DynamicImage, FrameError> {
+/// [`FrameReadError`] if it is missing, damaged or too large.
+pub fn read_image(path: &Path) -> Result<DynamicImage, FrameReadError> {
     let image = decode_checked(path, |header, _| match header.stored {
-        (width, height) if width.saturating_mul(height) > MAX_PIXELS => {
-            Err(FrameError::TooManyPixels { path: path.to_owned(), found: header.stored, limit: MAX_PIXELS })
-        }
+        (width, height) if width.saturating_mul(height) > MAX_PIXELS => Err(FrameReadError::TooManyPixels {
+            path: path.to_owned(),
+            found: header.stored,
+            limit: MAX_PIXELS,
+        }),
         _ => Ok(()),
     });
     image.map(|(image, _)| image)
@@ -127,12 +129,12 @@ pub fn read_image(path: &Path) -> Result<DynamicImage, FrameError> {
 fn decode(
     path: &Path,
     size: (usize, usize),
-    check: impl Fn(ColorType) -> Result<(), FrameError>,
-) -> Result<DynamicImage, FrameError> {
+    check: impl Fn(ColorType) -> Result<(), FrameReadError>,
+) -> Result<DynamicImage, FrameReadError> {
     let (mut image, header) = decode_checked(path, |header, colour_type| {
         if !header.has_size(size) {
             let found = header.stored;
-            return Err(FrameError::SizeMismatch { path: path.to_owned(), found, expected: size });
+            return Err(FrameReadError::SizeMismatch { path: path.to_owned(), found, expected: size });
         }
         check(colour_type)
     })?;
@@ -145,15 +147,15 @@ fn decode(
 /// Decodes an image after `check` has found its size and pixel type good.
 fn decode_checked(
     path: &Path,
-    check: impl Fn(&ImageHeader, ColorType) -> Result<(), FrameError>,
-) -> Result<(DynamicImage, ImageHeader), FrameError> {
+    check: impl Fn(&ImageHeader, ColorType) -> Result<(), FrameReadError>,
+) -> Result<(DynamicImage, ImageHeader), FrameReadError> {
     let damaged = |reason: String| {
         // Some decoders break their messages into lines.
         let reason = reason.split_whitespace().collect::<Vec<_>>().join(" ");
-        FrameError::Damaged { path: path.to_owned(), reason }
+        FrameReadError::Damaged { path: path.to_owned(), reason }
     };
     let bytes = read_at_most(path, LARGEST_FILE).map_err(|error| match error {
-        FileError::Unreadable { path, reason } => FrameError::Unreadable { path, reason },
+        FileError::Unreadable { path, reason } => FrameReadError::Unreadable { path, reason },
         other => other.into(),
     })?;
     let reader = ImageReader::new(Cursor::new(&bytes))

@@ -45,12 +45,12 @@ use crate::FileError;
 pub use crate::trajectory_file::{TimedExposure, TimedPose};
 pub(crate) use calibration::MAX_PIXELS;
 pub use calibration::{
-    ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Readout,
-    Response, assumed_exposure_seconds,
+    ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Response,
+    Shutter, assumed_exposure_seconds,
 };
 pub use calibration::{check_camera, check_positive};
 pub use calibration_text::write_calibration;
-pub use error::{DatasetError, FrameError, Warning};
+pub use error::{DatasetError, FrameReadError, Warning};
 pub use exposure_list::{read_exposure_times, write_exposure_times};
 pub use frame::RgbdFrame;
 pub use frame::read_image;

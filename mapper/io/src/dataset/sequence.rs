@@ -15,8 +15,8 @@ use super::calibration::{
 use super::frame::{ImageHeader, header, read_colour, read_depth};
 use super::vignetting::{falloff_of_frames, falloff_of_pixels};
 use super::{
-    Calibration, CameraFact, DatasetError, ExposureSource, FrameError, InvalidValue, Knowledge, RgbdFrame,
-    Warning,
+    Calibration, CameraFact, DatasetError, ExposureSource, FrameReadError, InvalidValue, Knowledge,
+    RgbdFrame, Warning,
 };
 use crate::imu::{self, ImuRecording};
 use crate::trajectory_file::{TimedExposure, TimedPose};
@@ -250,11 +250,11 @@ impl Dataset {
     ///
     /// # Errors
     ///
-    /// [`FrameError`] if one of the images is missing, damaged or of the wrong size or type, or the index out of
+    /// [`FrameReadError`] if one of the images is missing, damaged or of the wrong size or type, or the index out of
     /// range. Other frames may be fine: skip this one and count it.
-    pub fn frame(&self, index: usize) -> Result<RgbdFrame, FrameError> {
+    pub fn frame(&self, index: usize) -> Result<RgbdFrame, FrameReadError> {
         let len = self.entries.len();
-        let entry = self.entries.get(index).ok_or(FrameError::IndexOutOfRange { index, len })?;
+        let entry = self.entries.get(index).ok_or(FrameReadError::IndexOutOfRange { index, len })?;
         let rgb = self.colour.undistort_colour(read_colour(&entry.colour, self.colour.size)?);
         let depth = self.depth.undistort_depth(read_depth(&entry.depth, self.depth.size)?);
         self.colour.check(&entry.colour)?;
@@ -429,12 +429,12 @@ impl ImageSource {
     }
 
     /// Refuses images that have come since the data set was opened: there may be no map for them.
-    fn check(&self, path: &Path) -> Result<(), FrameError> {
+    fn check(&self, path: &Path) -> Result<(), FrameReadError> {
         if self.is_there || !path.is_file() {
             return Ok(());
         }
         let reason = io::Error::other("no such image could be read when the data set was opened");
-        Err(FrameError::Unreadable { path: path.to_owned(), reason })
+        Err(FrameReadError::Unreadable { path: path.to_owned(), reason })
     }
 
     fn undistort_colour(&self, stored: Vec<u8>) -> Vec<u8> {

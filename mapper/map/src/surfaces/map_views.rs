@@ -4,7 +4,7 @@ use mba_raster::raster::RasterImage;
 use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 
-use super::{DepthView, ViewSource};
+use super::{ColouredDepth, ViewSource};
 use crate::map::{Scene, SceneRenderer};
 
 /// Depth is used where the map hides at least this share of what is behind it.
@@ -32,14 +32,14 @@ impl ViewSource for MapViews<'_> {
         self.poses.len()
     }
 
-    fn view(&mut self, index: usize) -> DepthView {
+    fn view(&mut self, index: usize) -> ColouredDepth {
         let (camera, world_from_camera) = (self.camera, self.poses[index]);
         self.renderer.render(self.map, camera, &world_from_camera);
         let RasterImage { colour: [red, green, blue], depth, alpha, .. } = &self.renderer.image;
         // Light and depth are sums of shares that add up to alpha.
         let mean = |sum: f32, alpha: f32| if alpha > OPAQUE { sum / alpha } else { 0.0 };
         let light = red.iter().zip(green).zip(blue).zip(alpha);
-        DepthView {
+        ColouredDepth {
             camera,
             world_from_camera,
             depth: depth.iter().zip(alpha).map(|(depth, alpha)| mean(*depth, *alpha)).collect(),

@@ -23,7 +23,7 @@ pub use of_field::surface_of_field;
 pub use sampling::sample_surface;
 pub use sight::{Sight, Trim};
 pub use tsdf::{FusionSettings, fuse_views};
-pub use view::{DepthView, ViewSource};
+pub use view::{ColouredDepth, ViewSource};
 
 use crate::map::Scene;
 

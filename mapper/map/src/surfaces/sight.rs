@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::components;
-use super::view::{DepthView, SurfaceView};
+use super::view::{ColouredDepth, SurfaceView};
 
 /// Weight of a colour where the view has no depth to be trusted: it counts where there is no other.
 const DOUBTFUL: f32 = 1e-6;
@@ -48,7 +48,7 @@ impl Sight {
     /// Takes another view into account: a vertex of `mesh`, the one this began with, is seen if it is in front of the
     /// camera, within the image and not deeper than the view's depth there by more than `tolerance` metres. Its colour
     /// is that of the view, if it is not nearer than the depth by more than that either.
-    pub fn look(&mut self, mesh: &Mesh, view: &DepthView, tolerance: f64) {
+    pub fn look(&mut self, mesh: &Mesh, view: &ColouredDepth, tolerance: f64) {
         let surface = SurfaceView::new(view);
         let vertices = self.vertices.par_iter_mut().zip(&mesh.vertices);
         vertices.for_each(|(vertex, position)| vertex.look(position, view, &surface, tolerance as f32));
@@ -93,7 +93,7 @@ fn lend(triangles: &[[u32; 3]], colours: &mut [Option<[u8; 3]>]) {
 }
 
 impl Vertex {
-    fn look(&mut self, position: &[f32; 3], view: &DepthView, surface: &SurfaceView, tolerance: f32) {
+    fn look(&mut self, position: &[f32; 3], view: &ColouredDepth, surface: &SurfaceView, tolerance: f32) {
         let at = surface.camera_from_world.transform_point(&Vector3::from(position.map(f64::from)));
         let image = view.camera.project(&at);
         let (width, height) = (view.camera.width, view.camera.height);

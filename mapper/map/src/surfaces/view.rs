@@ -23,7 +23,7 @@ const NEAREST: f32 = 0.5;
 
 /// Depth and colour of a scene from one pose.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DepthView {
+pub struct ColouredDepth {
     /// Intrinsics; its size is that of the images.
     pub camera: PinholeCamera,
     /// Pose of the camera.
@@ -40,7 +40,7 @@ pub trait ViewSource {
     fn count(&self) -> usize;
 
     /// A view by its index, which is below [`Self::count`]; the same every time, whatever the number of threads.
-    fn view(&mut self, index: usize) -> DepthView;
+    fn view(&mut self, index: usize) -> ColouredDepth;
 }
 
 /// The surface at a pixel, as a plane.
@@ -65,7 +65,7 @@ pub(super) struct SurfaceView {
 }
 
 impl SurfaceView {
-    pub(super) fn new(view: &DepthView) -> Self {
+    pub(super) fn new(view: &ColouredDepth) -> Self {
         let camera = view.camera;
         let pixels = camera.width * camera.height;
         // A source that keeps to its contract gives as many depths as pixels; missing ones are none.
@@ -111,7 +111,7 @@ impl PixelSurface {
 /// The plane that fits best around a pixel. In normalised image coordinates x, y the inverse depth of a plane
 /// `a X + b Y + c Z = 1` is `a x + b y + c`: a linear least-squares problem over those pixels of the window that
 /// belong to the same surface. This also evens out the bumps that single Gaussians make.
-fn surface_at(view: &DepthView, inverse_depth: &[f32], u: usize, v: usize) -> Option<PixelSurface> {
+fn surface_at(view: &ColouredDepth, inverse_depth: &[f32], u: usize, v: usize) -> Option<PixelSurface> {
     let PinholeCamera { width, height, fx, fy, cx, cy } = view.camera;
     let centre = inverse_depth[v * width + u];
     if centre <= 0.0 {
@@ -214,7 +214,7 @@ mod tests {
             let x = ((pixel % 41) as f32 - 20.0) / 100.0;
             2.0 * lean.cos() / (lean.cos() + lean.sin() * x)
         };
-        SurfaceView::new(&DepthView {
+        SurfaceView::new(&ColouredDepth {
             camera,
             world_from_camera: RigidTransform::identity(),
             depth: (0..41 * 31).map(depth).collect(),
@@ -241,13 +241,13 @@ mod tests {
     fn mixed_depth_at_edges_is_not_trusted() {
         // Near on the left, far on the right, and a column in between that belongs to neither.
         let depth = |k: usize| [1.0, 1.5, 2.0][(k % 9 + 1) / 5 + (k % 9) / 5];
-        let mut view = DepthView {
+        let mut view = ColouredDepth {
             camera: PinholeCamera { width: 9, height: 5, fx: 100.0, fy: 100.0, cx: 4.0, cy: 2.0 },
             world_from_camera: RigidTransform::identity(),
             depth: (0..45).map(depth).collect(),
             colour: Vec::new(),
         };
-        let row = |view: &DepthView| -> Vec<bool> {
+        let row = |view: &ColouredDepth| -> Vec<bool> {
             SurfaceView::new(view).pixels[18..27].iter().map(|pixel| pixel.cosine > 0.0).collect()
         };
         assert_eq!(row(&view), [true, true, true, true, false, true, true, true, true]);

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use mba_io::FileError;
-use mba_io::dataset::{FrameError, InvalidValue};
+use mba_io::dataset::{FrameReadError, InvalidValue};
 use mba_io::output::OutputError;
 
 /// A run cannot be exported.
@@ -100,7 +100,7 @@ pub enum ExportError {
     },
     /// An image cannot be read.
     #[error(transparent)]
-    Image(#[from] FrameError),
+    Image(#[from] FrameReadError),
     /// An image cannot be encoded.
     #[error("cannot encode {name}: {reason}")]
     Encode {

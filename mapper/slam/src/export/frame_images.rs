@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mba_io::dataset::{Dataset, FrameError, read_image};
+use mba_io::dataset::{Dataset, FrameReadError, read_image};
 use mba_tracker::geometry::PinholeCamera;
 
 use super::{DEPTH_UNIT, ExportError, PosedFrame};
@@ -73,7 +73,7 @@ impl ImageReader<'_> {
         let image = read_image(path)?;
         let Some(image) = image.as_luma16() else {
             let found = format!("{:?}", image.color());
-            return Err(FrameError::DepthFormat { path: path.to_owned(), found }.into());
+            return Err(FrameReadError::DepthFormat { path: path.to_owned(), found }.into());
         };
         self.check_size(path, [image.width(), image.height()])?;
         Ok(self.in_millimetres(image.as_raw().clone()))

@@ -1,6 +1,6 @@
 //! Frames between keyframes: fitted to the finished map.
 
-use mba_adjust::bundle::{BundleAdjustment, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
+use mba_adjust::bundle::{BundleAdjustment, MapKeyframe, NOTICEABLE, PathPrior, Placed, log_brightness};
 use mba_io::dataset::Dataset;
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::geometry::RigidTransform;
@@ -61,7 +61,7 @@ pub(super) fn all_exposures(
         if fit.includes(frames.records[index].status)
             && let Ok(observation) = observation(dataset, &sensor, index)
         {
-            let unmapped = Keyframe::new(
+            let unmapped = MapKeyframe::new(
                 index,
                 observation,
                 PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },

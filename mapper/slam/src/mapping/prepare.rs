@@ -1,7 +1,7 @@
 //! From a run to a bundle that can be adjusted.
 
 use mba_adjust::bundle::{
-    BundleAdjustment, FrameState, Keyframe, NOTICEABLE, PathPrior, Placed, log_brightness,
+    BundleAdjustment, FrameState, MapKeyframe, NOTICEABLE, PathPrior, Placed, log_brightness,
 };
 use mba_adjust::continuity::{ContinuitySettings, FrameVerdict, Suspicion, predict_motions};
 use mba_io::dataset::Dataset;
@@ -155,7 +155,7 @@ pub(super) fn bundle(
     let mut keyframes = Vec::new();
     for (index, observation) in loaded {
         match observation {
-            Ok(observation) => keyframes.push(Keyframe::new(index, observation, frames.priors[index])),
+            Ok(observation) => keyframes.push(MapKeyframe::new(index, observation, frames.priors[index])),
             Err(reason) => frames.warnings.push(format!("keyframe {index} left out: {reason}")),
         }
     }
@@ -172,7 +172,7 @@ pub(super) fn bundle(
 
 /// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.
 /// The map is as bright as the median keyframe.
-fn set_gains(sensor: &Sensor, keyframes: &[Keyframe], states: &mut [FrameState]) {
+fn set_gains(sensor: &Sensor, keyframes: &[MapKeyframe], states: &mut [FrameState]) {
     let ratios: Vec<f64> = (1..keyframes.len())
         .into_par_iter()
         .map(|k| {

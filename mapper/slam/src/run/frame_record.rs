@@ -3,19 +3,17 @@
 use std::path::Path;
 
 use mba_io::whole_file::read_text;
+use mba_tracker::FrameStatus;
 use serde::{Deserialize, Serialize};
 
 use super::RunError;
 
-/// How far a frame's pose can be trusted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum FrameStatus {
-    /// Aligned.
+/// The tracker's status as it is written.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "FrameStatus", rename_all = "lowercase")]
+enum StoredStatus {
     Ok,
-    /// Aligned with few inliers or a large residual.
     Weak,
-    /// Not aligned; the pose is held from before.
     Lost,
 }
 
@@ -25,7 +23,8 @@ pub enum FrameStatus {
 pub struct FrameRecord {
     /// Mid exposure, seconds.
     pub timestamp: f64,
-    /// Trust.
+    /// How far the pose can be trusted.
+    #[serde(with = "StoredStatus")]
     pub status: FrameStatus,
     /// 1 if this frame became a keyframe, else 0.
     pub keyframe: u8,
@@ -118,11 +117,7 @@ pub(super) fn format_frames(frames: &[FrameRecord]) -> String {
     let mut text = COLUMNS.join(",");
     text.push('\n');
     for f in frames {
-        let status = match f.status {
-            FrameStatus::Ok => "ok",
-            FrameStatus::Weak => "weak",
-            FrameStatus::Lost => "lost",
-        };
+        let status = f.status.name();
         text.push_str(&format!(
             "{:.6},{status},{},{:.3},{:.3},{},{},{:.6},{:.4},{:.4},{},{}\n",
             f.timestamp,

@@ -28,13 +28,16 @@ mod writer;
 pub use camera::{RunCamera, RunResponse};
 pub use deblurred_keyframes::write_deblurred_keyframes;
 pub use error::RunError;
-pub use frame_record::{FrameRecord, FrameStatus, Reason};
+pub use frame_record::{FrameRecord, Reason};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
 pub(crate) use rows::RunRows;
 pub use stored_path::{path_of, stored_path};
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;
+
+/// How far the pose of a frame can be trusted, as the tracker says it.
+pub use mba_tracker::FrameStatus;
 
 pub use mba_io::run_layout::{
     CHECKPOINT_FILE, DEBLURRED_FOLDER, DEPTH_FOLDER, EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE,

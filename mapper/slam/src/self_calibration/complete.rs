@@ -1,6 +1,6 @@
 //! Completing a data set: exposure and readout times that are not on record.
 
-use mba_io::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Readout, survey};
+use mba_io::dataset::{Calibration, Dataset, DatasetError, ExposureSource, Knowledge, Shutter, survey};
 use mba_tracker::geometry::PinholeCamera;
 
 use super::depth_lag::depth_lag;
@@ -165,7 +165,7 @@ impl Estimates {
         // What edges do not tell for certain is taken for none: both sensors roll, or neither.
         let longer = self.longer_than_depth.filter(|_| !depth_is_known);
         let longer_than_depth = longer.map(|rows| if rows.is_certain() { rows.seconds } else { 0.0 });
-        let is_rolling = matches!(calibration.readout, Readout::Rolling { .. });
+        let is_rolling = matches!(calibration.readout, Shutter::Rolling { .. });
         let search = ReadoutSearch { window, scale, guess: &probe.guess, longer_than_depth, is_rolling };
         let Some(found) = search.find() else { return probe };
         self.readout = Some(found);
@@ -178,7 +178,7 @@ impl Estimates {
         let mut calibration = dataset.calibration().clone();
         let exposure_known = is_exposure_known(&calibration);
         if let Some(found) = self.readout {
-            calibration.readout = Readout::Rolling { seconds: Some(found.seconds) };
+            calibration.readout = Shutter::Rolling { seconds: Some(found.seconds) };
             calibration.sources.readout = Knowledge::Estimated;
         }
         if let Some(seconds) = self.depth_readout {
@@ -246,8 +246,8 @@ impl Estimates {
     fn readout_finding(&self, calibration: &Calibration) -> Finding {
         let Some(found) = self.readout else {
             let note = match calibration.readout {
-                Readout::Global => "rows explain no more than a global shutter",
-                Readout::Rolling { .. } => "too little to tell; all rows are taken for exposed together",
+                Shutter::Global => "rows explain no more than a global shutter",
+                Shutter::Rolling { .. } => "too little to tell; all rows are taken for exposed together",
             };
             return Finding {
                 fact: "readout",

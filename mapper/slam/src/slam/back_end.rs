@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use mba_adjust::bundle::{BundleState, Keyframe, MapModel, PathPrior};
+use mba_adjust::bundle::{BundleState, MapKeyframe, MapModel, PathPrior};
 use mba_io::checkpoint::exact_poses::{numbers, pose};
 use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
@@ -334,13 +334,13 @@ pub(super) fn keyframes(
     sensor: &Sensor,
     saved: &[SavedKeyframe],
     images: &[RgbdFrame],
-) -> Result<Vec<Keyframe>, SlamError> {
+) -> Result<Vec<MapKeyframe>, SlamError> {
     let keyframe = |(saved, image): (&SavedKeyframe, &RgbdFrame)| {
         let reason = || "its size is not the camera's".to_owned();
         let observation = ObservationPyramid::new(sensor, image, LEVELS)
             .ok_or_else(|| SlamError::Keyframe { index: saved.index, reason: reason() })?;
         let prior = PathPrior { middle: pose(saved.middle), motion: None };
-        Ok(Keyframe::new(saved.index, observation, prior))
+        Ok(MapKeyframe::new(saved.index, observation, prior))
     };
     saved.iter().zip(images).map(keyframe).collect()
 }

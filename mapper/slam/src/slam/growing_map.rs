@@ -1,7 +1,7 @@
 //! The map while frames come in.
 
 use mba_adjust::bundle::{
-    BundleAdjustment, BundleState, DepthSource, FrameState, Keyframe, MapModel, NOTICEABLE, PathPrior,
+    BundleAdjustment, BundleState, DepthSource, FrameState, MapKeyframe, MapModel, NOTICEABLE, PathPrior,
     Placed, Schedule, log_brightness,
 };
 use mba_io::dataset::RgbdFrame;
@@ -71,7 +71,7 @@ impl GrowingMap {
     pub(super) fn restored(
         sensor: Sensor,
         settings: &SlamSettings,
-        (keyframes, state): (Vec<Keyframe>, BundleState),
+        (keyframes, state): (Vec<MapKeyframe>, BundleState),
         (max_gaussians, growth): (usize, Growth),
     ) -> Self {
         let mut map = Self::new(sensor, settings);
@@ -112,7 +112,7 @@ impl GrowingMap {
         let prior = PathPrior { middle: path.ends.mid(), motion: None };
         let mut state = FrameState::new(path);
         state.log_gain = near.first().map_or(0.0, |near| self.log_gain(near.keyframe, &observation, &state));
-        self.bundle.push(Keyframe::new(image.index, observation, prior), state);
+        self.bundle.push(MapKeyframe::new(image.index, observation, prior), state);
         self.seed();
         if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
             && let Some(k) = most_dispensable(&self.bundle, &camera)

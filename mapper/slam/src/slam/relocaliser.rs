@@ -1,6 +1,6 @@
 //! Aligning a frame with a sharp view outside of the tracking loop: to recognise a place, or to judge a view.
 
-use mba_adjust::bundle::{FrameState, Keyframe};
+use mba_adjust::bundle::{FrameState, MapKeyframe};
 use mba_adjust::deblurring::{DeblurMemory, KeyframeDeblurrer};
 use mba_io::dataset::RgbdFrame;
 use mba_tracker::error::FrameError as TrackError;
@@ -62,7 +62,7 @@ impl Relocaliser {
     /// A keyframe as a sharp view: deblurred with its own motion.
     pub(super) fn keyframe_view(
         &mut self,
-        keyframe: &Keyframe,
+        keyframe: &MapKeyframe,
         state: &FrameState,
         depth_scale: f64,
     ) -> SharpView {

@@ -7,7 +7,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use mba_adjust::bundle::{BundleState, Keyframe};
+use mba_adjust::bundle::{BundleState, MapKeyframe};
 use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, save};
 use mba_io::dataset::Dataset;
@@ -81,8 +81,8 @@ pub(super) struct SavedKeyframe {
     pub(super) middle: PoseNumbers,
 }
 
-impl From<&Keyframe> for SavedKeyframe {
-    fn from(keyframe: &Keyframe) -> Self {
+impl From<&MapKeyframe> for SavedKeyframe {
+    fn from(keyframe: &MapKeyframe) -> Self {
         Self { index: keyframe.index, middle: numbers(&keyframe.prior.middle) }
     }
 }

@@ -21,7 +21,7 @@ pub use pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PATTERN_RADIUS};
 pub use pixel::{TransferredPixel, transfer_pixel};
 pub use problem::{
     BOWED_PATH, BOWED_ROW_LENGTH, BrightnessModel, LINEAR_PATH, PatchRows, PatchSite, PatchValues,
-    ROW_LENGTH, RowTimes, TransferProblem,
+    ROW_LENGTH, RowDelay, TransferProblem,
 };
 pub use sums::{BowedSums, PatchCost, PhotometricSums, ResidualModel, huber};
 pub use virtual_view::{MAX_BANDS, MAX_VIRTUAL_VIEWS, RowBand, VirtualView, virtual_views};

@@ -63,13 +63,13 @@ pub struct TransferProblem<'a> {
     /// Photometric relation.
     pub brightness: BrightnessModel,
     /// How the time of a row differs from that of the views.
-    pub rows: RowTimes,
+    pub rows: RowDelay,
 }
 
 /// Rows that are exposed one after the other: `views` are those of one row, a patch in row `v` of the current image is
 /// exposed `(v - centre) step` later, in units of normalised time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RowTimes {
+pub struct RowDelay {
     /// Row whose views are given.
     pub centre: f32,
     /// Normalised time from one row to the next; 0 for a global shutter.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::settings::FusionSettings;
 use crate::surfaces::SurfaceError;
-use crate::surfaces::view::{DepthView, SurfaceView};
+use crate::surfaces::view::{ColouredDepth, SurfaceView};
 
 /// Voxels along the edge of a block.
 pub(super) const EDGE: usize = 8;
@@ -45,7 +45,7 @@ impl Blocks {
 
 /// Adds the places of the blocks around the surface that a view shows to the sorted list `places`.
 pub(super) fn add_places(
-    view: &DepthView,
+    view: &ColouredDepth,
     settings: &FusionSettings,
     places: &mut Vec<Place>,
 ) -> Result<(), SurfaceError> {
@@ -83,14 +83,14 @@ impl FusionSettings {
 
 /// From pixels to the blocks that they see.
 struct Rays<'a> {
-    view: &'a DepthView,
+    view: &'a ColouredDepth,
     /// Edge of a block, metres.
     block: f64,
     truncation: f64,
 }
 
 impl<'a> Rays<'a> {
-    fn new(view: &'a DepthView, settings: &FusionSettings) -> Self {
+    fn new(view: &'a ColouredDepth, settings: &FusionSettings) -> Self {
         Self { view, block: settings.voxel * EDGE as f64, truncation: settings.truncation() }
     }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::blocks::{Block, Blocks, EDGE, Place};
 use super::settings::FusionSettings;
-use crate::surfaces::view::{DepthView, SurfaceView};
+use crate::surfaces::view::{ColouredDepth, SurfaceView};
 
 /// Voxels nearer to the camera than this, metres, are left alone.
 const NEAREST: f32 = 0.05;
@@ -30,7 +30,7 @@ struct Fusion<'a> {
 
 /// Averages the distances of a view into the blocks: negative behind its surfaces up to the truncation distance,
 /// positive in front of them, which also clears what other views have put there by mistake.
-pub(super) fn fuse(view: &DepthView, settings: &FusionSettings, blocks: &mut Blocks) {
+pub(super) fn fuse(view: &ColouredDepth, settings: &FusionSettings, blocks: &mut Blocks) {
     let surface = SurfaceView::new(view);
     let fusion = Fusion::new(&surface, settings);
     let Blocks { places, blocks } = blocks;

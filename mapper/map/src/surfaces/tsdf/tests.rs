@@ -4,7 +4,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::*;
-use crate::surfaces::{DepthView, Sight, Trim};
+use crate::surfaces::{ColouredDepth, Sight, Trim};
 
 const CAMERA: PinholeCamera =
     PinholeCamera { width: 128, height: 96, fx: 100.0, fy: 100.0, cx: 63.5, cy: 47.5 };
@@ -59,7 +59,7 @@ impl ViewSource for Room {
         self.poses.len()
     }
 
-    fn view(&mut self, index: usize) -> DepthView {
+    fn view(&mut self, index: usize) -> ColouredDepth {
         let world_from_camera = self.poses[index];
         let PinholeCamera { width, height, .. } = CAMERA;
         let pixel = |k: usize| [k % width, k / width];
@@ -70,7 +70,7 @@ impl ViewSource for Room {
             if speck { 1.0 } else { cast(&world_from_camera.translation, &ray) as f32 }
         };
         let pixels = 0..width * height;
-        DepthView {
+        ColouredDepth {
             camera: CAMERA,
             world_from_camera,
             depth: pixels.clone().map(depth).collect(),

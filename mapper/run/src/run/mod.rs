@@ -31,7 +31,7 @@ pub use error::RunError;
 pub use frame_record::{FrameRecord, Reason};
 pub use merit::{Merit, mid_pose, trajectory_figures};
 pub use reader::Run;
-pub(crate) use rows::RunRows;
+pub use rows::RunRows;
 pub use stored_path::{path_of, stored_path};
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use writer::RunWriter;

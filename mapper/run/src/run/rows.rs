@@ -8,7 +8,7 @@ use super::{FrameRecord, RunError, RunWriter};
 
 /// Everything that a [`RunWriter`] was told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct RunRows {
+pub struct RunRows {
     /// Time and poses at opening, middle and closing of the shutter.
     exposures: Vec<(f64, [PoseNumbers; 3])>,
     frames: Vec<FrameRecord>,
@@ -18,12 +18,20 @@ pub(crate) struct RunRows {
 
 impl RunRows {
     /// Number of frames.
-    pub(crate) fn len(&self) -> usize {
+    #[must_use]
+    pub fn len(&self) -> usize {
         self.frames.len()
     }
 
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.frames.is_empty()
+    }
+
     /// Whether these can be rows of a data set of `frames` frames.
-    pub(crate) fn is_of(&self, frames: usize) -> bool {
+    #[must_use]
+    pub fn is_of(&self, frames: usize) -> bool {
         let rows = self.len();
         rows <= frames && self.exposures.len() == rows && self.skipped <= rows
     }
@@ -31,7 +39,8 @@ impl RunRows {
 
 impl RunWriter {
     /// What was recorded so far.
-    pub(crate) fn rows(&self) -> RunRows {
+    #[must_use]
+    pub fn rows(&self) -> RunRows {
         let row = |exposure: &TimedExposure| {
             (exposure.timestamp, [exposure.start, exposure.mid, exposure.end].map(|pose| numbers(&pose)))
         };
@@ -47,7 +56,7 @@ impl RunWriter {
     ///
     /// # Errors
     /// As [`Self::flush`].
-    pub(crate) fn go_on(&mut self, rows: RunRows) -> Result<(), RunError> {
+    pub fn go_on(&mut self, rows: RunRows) -> Result<(), RunError> {
         self.is_started = true;
         self.restore(rows)
     }
@@ -56,7 +65,7 @@ impl RunWriter {
     ///
     /// # Errors
     /// As [`Self::flush`].
-    pub(crate) fn restore(&mut self, rows: RunRows) -> Result<(), RunError> {
+    pub fn restore(&mut self, rows: RunRows) -> Result<(), RunError> {
         let exposure = |(timestamp, poses): (f64, [PoseNumbers; 3])| {
             let [start, mid, end] = poses.map(pose);
             TimedExposure { timestamp, start, mid, end }

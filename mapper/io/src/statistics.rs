@@ -31,6 +31,7 @@ impl Statistics {
         sorted.sort_by(f64::total_cmp);
         let mean = errors.iter().sum::<f64>() / count;
         let mean_square = errors.iter().map(|e| e * e).sum::<f64>() / count;
+        // About the mean; the root mean square is about zero.
         let variance = errors.iter().map(|e| (e - mean) * (e - mean)).sum::<f64>() / count;
         Some(Self {
             rmse: mean_square.sqrt(),

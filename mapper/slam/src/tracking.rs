@@ -223,6 +223,7 @@ pub(crate) fn timed_result(result: &FrameResult) -> TimedExposure {
 
 /// A frame as the tracker takes it.
 pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
+    // Images of a data set have no padding: a row is as long as its pixels.
     let (width, height) = (image.width, image.height);
     Ok(Frame {
         timestamp: image.timestamp,
@@ -255,6 +256,7 @@ pub(crate) fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Opti
 
 /// What is recorded of a frame that took `ms` milliseconds.
 pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
+    // Counts of the table have 32 bits.
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     FrameRecord {
         timestamp: result.timestamp,
@@ -287,6 +289,7 @@ fn reason(doubt: Doubt) -> Reason {
 
 /// The stand-in for a frame without a result: a camera that stays where it was.
 pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
+    // Nothing is known of it: every figure that does not exist is NaN.
     let pose = last.map_or_else(RigidTransform::identity, |exposure| exposure.mid);
     let exposure = TimedExposure { timestamp, start: pose, mid: pose, end: pose };
     let record = FrameRecord {

@@ -188,6 +188,7 @@ impl SynthConfig {
     /// Checks every number.
     pub(super) fn check(&self) -> Result<(), SynthError> {
         let interval = 1.0 / self.frame_rate;
+        // More blur than an eighth of the image leaves nothing to track.
         let longest_blur = self.width as f64 / 8.0;
         let well = self.noise.map_or(1.0, |noise| noise.full_well);
         let read = self.noise.map_or(0.0, |noise| noise.read_noise);
@@ -219,6 +220,7 @@ impl SynthConfig {
     fn check_sensor(&self) -> Result<(), SynthError> {
         let SensorModel { readout_seconds, depth_delay_seconds, depth_readout_seconds, vignetting, .. } =
             self.sensor;
+        // Rows of one frame are read before those of the next, and a tenth of a second is no camera.
         let longest_readout = (1.0 / self.frame_rate).min(0.1);
         let readouts = -longest_readout..=longest_readout;
         let of_at_most = "seconds of at most 0.1 and the frame interval, either way";
@@ -241,6 +243,7 @@ impl SynthConfig {
         let outside = |setting, index: usize, expected| {
             Err(SynthError::Setting { setting, value: index as f64, expected })
         };
+        // Ranges are in order: the last index is the largest.
         for (setting, ranges) in [("black frame", black), ("saturated frame", saturated)] {
             if let Some(index) = ranges.last().filter(beyond) {
                 return outside(setting, index, "frames of the sequence, counted from 0");
@@ -250,6 +253,7 @@ impl SynthConfig {
             Some(index) if index == 0 || beyond(&index) => {
                 outside("jump at frame", index, "a frame of the sequence after the first")
             }
+            // A jump has no acceleration that an IMU could have measured.
             Some(index) if self.sensor.imu => {
                 outside("jump at frame", index, "none with an IMU, which would have to feel it")
             }

@@ -141,6 +141,7 @@ fn sensor_notes(sequence: &SynthSequence) -> String {
     } = config.sensor;
     let events = &config.events;
     let mut notes = Vec::new();
+    // What is ideal is not mentioned.
     if readout_seconds != 0.0 {
         notes.push(format!(
             "Rolling shutter: row v is exposed around the timestamp plus ((v + 1/2)/{} - 1/2) * {readout_seconds} s. \

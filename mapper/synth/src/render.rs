@@ -77,6 +77,7 @@ pub(super) fn rolling_radiance(
 ) -> Vec<Vec3> {
     let mut image = vec![Vec3::ZERO; size.width * size.height];
     image.par_chunks_mut(size.width).enumerate().for_each(|(row, pixels)| {
+        // Only what a block of pixels can see is tested for each of its rays.
         let mut visible = Vec::new();
         for (k, offset) in offsets.iter().enumerate() {
             let sub_frame = SubFrame { view: view_at(row, k), offset: *offset };

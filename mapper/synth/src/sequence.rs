@@ -185,6 +185,7 @@ impl SynthSequence {
     pub fn render_frame(&self, index: usize) -> SynthFrame {
         let blur = self.blur(index);
         let sub_frames = self.sub_frame_count(index, &blur);
+        // A covered or flooded frame has one value everywhere, and no depth.
         let flood = self.config.events.flood(index);
         let rgb = match flood {
             Some(value) => vec![value; 3 * self.camera.width * self.camera.height],

@@ -93,6 +93,7 @@ fn write_all(
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.len());
         Ok(written)
     };
+    // Frames side by side, in their order.
     let written: Vec<_> =
         (0..sequence.len()).into_par_iter().map(write_counted).collect::<Result<_, SynthError>>()?;
     let summary = summarise(&written);
@@ -103,6 +104,7 @@ fn write_all(
     if !sequence.config().sensor.is_on_record {
         truth::write(sequence, folder)?;
     }
+    // The calibration is the last: a folder without it is not complete.
     for (name, text) in texts(sequence, &summary, &written) {
         write_text(&folder.join(name), &text)?;
     }
@@ -157,6 +159,7 @@ fn clear(folder: &Path) {
     for images in IMAGE_FOLDERS.map(|name| folder.join(name)) {
         for file in fs::read_dir(&images).into_iter().flatten().flatten() {
             let name = file.file_name();
+            // Whatever else lies there was put there by others.
             if name.to_str().is_some_and(is_own_image) {
                 remove(file.path());
             }

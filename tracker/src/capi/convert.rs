@@ -88,6 +88,7 @@ pub(super) fn settings(config: &TrackerConfig) -> MbaConfig {
             ReferenceMode::Deblurred => MBA_REFERENCE_DEBLURRED,
             ReferenceMode::Raw => MBA_REFERENCE_RAW,
         },
+        // What effort changes is already in the other settings.
         effort: MBA_EFFORT_FULL,
         response: core::ptr::null(),
         clock: None,
@@ -105,6 +106,7 @@ pub(super) unsafe fn colour<'a>(image: &MbaImage) -> Result<ColourView<'a>, i32>
         _ => return Err(MBA_ERROR_PIXEL_FORMAT),
     };
     let (width, stride) = (image.width as usize, image.stride_bytes as usize);
+    // Before the bytes are looked at: with a short stride rows would overlap.
     if stride < width.saturating_mul(format.bytes()) {
         return Err(MBA_ERROR_STRIDE);
     }

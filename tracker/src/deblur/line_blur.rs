@@ -92,6 +92,7 @@ fn blur_blocks<S: Simd>(simd: S, image: &[f32], flow: &BlurFlow, views: usize, o
     for (block, displacement) in flow.displacement.iter().enumerate() {
         let (u, v) = ((block % per_row) * BLOCK_WIDTH, (block / per_row) * BLOCK_HEIGHT);
         taps.fill(simd, displacement, views);
+        // Blocks whose paths stay inside need no check of their edges.
         let sums = if path_is_inside(&taps, flow, u, v) {
             block_sums::<S, true>(simd, image, flow, &taps, u, v)
         } else {
@@ -99,6 +100,7 @@ fn blur_blocks<S: Simd>(simd: S, image: &[f32], flow: &BlurFlow, views: usize, o
         };
         for (row, sum) in (v..flow.height).zip(&sums) {
             let mean = *sum * (1.0 / views as f32);
+            // The last block of a row may be narrower.
             let columns = BLOCK_WIDTH.min(flow.width - u);
             out[row * flow.width + u..][..columns].copy_from_slice(&mean.as_slice()[..columns]);
         }

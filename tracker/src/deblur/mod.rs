@@ -115,6 +115,7 @@ impl<'m> DeblurScratch<'m> {
         let residual_before = self.compare(level, views, sharp);
         let mut residual_after = residual_before;
         for _ in 0..iterations {
+            // Richardson and Lucy: the ratio of captured to reblurred light, blurred once more, corrects every pixel.
             blur_along(level, self.reblurred, &self.flow, views, self.correction);
             for (light, factor) in sharp.iter_mut().zip(&*self.correction) {
                 *light *= factor;
@@ -159,9 +160,11 @@ fn ratios<S: Simd>(simd: S, captured: &[f32], reblurred: &mut [f32]) -> f64 {
             let (light, modelled) = (f32x8::from_slice(simd, b), f32x8::from_slice(simd, r));
             let difference = light - modelled;
             sum = difference.mul_add(difference, sum);
+            // Dark pixels would be ratios of noise, and no step changes a pixel by much.
             let ratio = (light + RATIO_FLOOR) / (modelled + RATIO_FLOOR);
             let ratio = ratio.max(1.0 / RATIO_LIMIT).min(RATIO_LIMIT);
             let one = f32x8::splat(simd, 1.0);
+            // What is saturated says nothing about how much more there was.
             light.simd_gt(SATURATION).select(one, ratio).store_slice(r);
         }
         for (&light, modelled) in captured[split..].iter().zip(&mut reblurred[split..]) {

@@ -105,6 +105,7 @@ impl<'m> Keyframe<'m> {
                 dark_intensity,
                 region: region.at_level(level),
             };
+            // Every level has its own keypoints: what is an edge on one is noise or flat on another.
             self.counts[level] = select_keypoints(
                 &self.pyramid.levels[level].image(),
                 level,

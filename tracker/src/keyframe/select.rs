@@ -48,6 +48,7 @@ pub fn select_keypoints(
     settings: &SelectionSettings,
     keypoints: &mut [Keypoint],
 ) -> usize {
+    // A patch and its gradient have to fit in.
     let region = settings.region.shrunk(PATTERN_RADIUS + 1);
     let cell = settings.cell.max(1);
     let mut count = 0;
@@ -62,6 +63,7 @@ pub fn select_keypoints(
                 continue;
             };
             let at = |x: usize| PinholeCamera::pixel_at_level(x as f32, level, planes_level);
+            // Without a plane the patch would be at any depth.
             if let Some(inverse_depth) = planes.inverse_depth(at(u), at(v)) {
                 keypoints[count] = Keypoint { u: u as f32, v: v as f32, inverse_depth, strength };
                 count += 1;
@@ -94,6 +96,7 @@ fn strongest(
         let below = &image.pixels[(v + 1) * w..][..w];
         for u in columns.clone() {
             let (gu, gv) = (0.5 * (row[u + 1] - row[u - 1]), 0.5 * (below[u] - above[u]));
+            // Photon noise grows with the light: gradients are compared in units of it.
             let squared = (gu * gu + gv * gv) / (row[u] + settings.dark_intensity);
             if squared > best_squared {
                 best_squared = squared;

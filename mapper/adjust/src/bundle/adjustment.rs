@@ -359,6 +359,7 @@ impl BundleAdjustment {
             .context
             .gaussian_loss
             .render(gaussians, Exposure { seen, path: &frame.path, gain: 1.0, views });
+        // What the lens takes away, and the gain of the frame.
         let as_captured = |plane: &Vec<f32>| match &seen.falloff {
             Some(falloff) => {
                 plane.iter().zip(&**falloff).map(|(light, share)| gain * light * share).collect()

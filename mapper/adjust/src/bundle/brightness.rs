@@ -39,10 +39,12 @@ pub fn log_brightness(response: &InverseResponse, one: Placed<'_>, other: Placed
     let mut ratios = Vec::new();
     for v in (0..camera.height).step_by(STRIDE) {
         for u in (0..camera.width).step_by(STRIDE) {
+            // The surface point of a pixel of one picture, and where the other one sees it.
             let depth = f64::from(one.seen.depth[v * camera.width + u]);
             let point = other_from_one.transform_point(&(camera.ray(u as f64, v as f64) * depth));
             let Some(pixel) = pixel_of(other.seen, &point).filter(|_| depth > 0.0) else { continue };
             let measured = f64::from(other.seen.depth[pixel]);
+            // Something else is in front of it, or it has moved.
             if (measured - point.z).abs() > SAME_SURFACE * point.z {
                 continue;
             }

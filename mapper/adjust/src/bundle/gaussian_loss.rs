@@ -46,6 +46,7 @@ impl GaussianLoss {
         exposure: Exposure<'_>,
         plan: &StepPlan,
     ) -> ExposureLoss {
+        // Forward: the mean of virtual views, then display values beside the captured ones.
         self.render(gaussians, exposure);
         let Exposure { seen, gain, .. } = exposure;
         let (camera, gain) = (&seen.camera, gain as f32);
@@ -56,6 +57,7 @@ impl GaussianLoss {
             terms.similarity = self.planes.add_similarity(&mut self.ssim, size, plan.weights.similarity);
         }
         self.grad_image.resize(camera.width, camera.height);
+        // Backward: from display values to light, from light to Gaussians and path.
         let grad_log_gain = self.planes.gradient_by_light(image, &mut self.grad_image);
         terms.depth = compare_depth(image, seen, &plan.weights, &mut self.grad_image);
         self.gradients.reset(gaussians.len());

@@ -31,6 +31,7 @@ impl PathMetric {
     #[must_use]
     pub fn new(seen: &Observation, typical_depth: f64) -> Self {
         let camera = &seen.camera;
+        // A pixel as an angle, and as a length at the typical depth: unknowns of like size.
         let radians = 1.0 / camera.fx;
         let metres = typical_depth * radians;
         let scale = Vector6::new(metres, metres, metres, radians, radians, radians);
@@ -43,12 +44,14 @@ impl PathMetric {
                 let [along, down] = gradient(seen, x, y);
                 let measured = f64::from(seen.depth[y * camera.width + x]);
                 let depth = if measured > 0.0 { measured } else { typical_depth };
+                // One line of J: how the value at the pixel changes with a unit of each unknown.
                 let row = movement(camera, [x as f64, y as f64], depth, [along, down])
                     .component_mul(&scale.transpose());
                 information += row.transpose() * row;
                 weight += along * along + down * down;
             }
         }
+        // J^T J over the squared gradients, and its roots: in their coordinates all directions are alike.
         let [unscaled, inverse] = roots(&(information / f64::max(weight, 1e-12)));
         Self {
             tangent_from_unit: Matrix6::from_diagonal(&scale) * unscaled,

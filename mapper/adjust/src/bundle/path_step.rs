@@ -75,11 +75,14 @@ impl PathMoments {
         metric: &PathMetric,
         step: PathStep,
     ) {
+        // Middle, motion and bow in units of about a pixel.
         let blocks = grad_coordinates(gradient).map(|block| metric.grad_units(path, &block));
         self.updates += 1;
         let updates = self.updates.min(10_000) as i32;
+        // Adam: running means of gradient and square, without the bias of their start at zero.
         let corrections = [BETA_1, BETA_2].map(|beta| 1.0 / (1.0 - beta.powi(updates)));
         self.second = BETA_2 * self.second + (1.0 - BETA_2) * blocks[0].norm_squared() / 6.0;
+        // One scale for all unknowns, that of the middle: the direction of the gradient is kept.
         let typical = (self.second * corrections[1]).sqrt() + 1e-20;
         let gradients = self.with_prior(blocks, typical, path, prior, metric);
         let scale = -step.pixels * corrections[0] / typical;
@@ -87,6 +90,7 @@ impl PathMoments {
         for (block, (mean, gradient)) in self.first.iter_mut().zip(gradients).enumerate() {
             let mean_now = Vector6::from(*mean) * BETA_1 + gradient * (1.0 - BETA_1);
             *mean = mean_now.into();
+            // A single gradient that is far too large moves the path no further than a few others.
             moves[block] = capped(mean_now * scale, LONGEST * step.pixels);
         }
         let held = moves.iter_mut().zip(step.hold).filter(|(_, hold)| *hold);

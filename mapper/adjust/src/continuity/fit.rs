@@ -197,6 +197,7 @@ impl<'a> State<'a> {
 
     fn bending_cost(&self, part: Part) -> f64 {
         let steps = self.path.steps(part);
+        // Third differences of the control points are the jerk, up to a factor of the interval.
         let thirds = steps.windows(3).map(|w| w[2] - w[1] * 2.0 + w[0]);
         let huber = self.settings.huber;
         thirds

@@ -219,6 +219,7 @@ fn sightings(one: &Taken<'_>, other: &Taken<'_>, points: [&[[usize; 2]]; 2]) -> 
 fn differences(sightings: &[Sighting]) -> [Vec<Option<f64>>; 2] {
     let lights = sightings.iter().filter_map(|sighting| sighting.lights);
     let sums = lights.fold([0.0; 2], |[a, b], [x, y]| [a + x, b + y]);
+    // Exposure control or another response between the two: one factor for all points.
     let gain = if sums[0] > 0.0 { sums[1] / sums[0] } else { 1.0 };
     [
         sightings.iter().map(|s| s.lights.map(|[a, b]| gain * a - b)).collect(),
@@ -234,6 +235,7 @@ pub fn compare_exposures(
     [measured, suggested]: [&ExposureTrajectory; 2],
     references: &[(&FramePicture, ExposureTrajectory)],
 ) -> Option<Mismatch> {
+    // Each picture is taken along both candidates and compared with the same references.
     let candidates = [measured, suggested].map(|path| Taken::new(picture, path));
     let own = picture.points();
     let mut sums = [0.0; 2];

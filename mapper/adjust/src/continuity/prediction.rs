@@ -73,6 +73,7 @@ fn velocity(frames: &[ContinuityFrame], k: usize, longest_gap: f64) -> Option<Ve
         (frame.noise.is_some() && gap <= longest_gap).then_some(frame)
     };
     let middle = near(k, k)?;
+    // Two neighbours make it a parabola; four a quartic, whose error is of the next order but one.
     let mut others = vec![near(k.checked_sub(1)?, k)?, near(k + 1, k)?];
     if let (Some(before), Some(after)) = (k.checked_sub(2).and_then(|l| near(l, l + 1)), near(k + 2, k + 1)) {
         others.extend([before, after]);
@@ -89,6 +90,7 @@ fn velocity(frames: &[ContinuityFrame], k: usize, longest_gap: f64) -> Option<Ve
 fn derivative_at_zero(mid: &RigidTransform, others: &[(f64, RigidTransform)]) -> Vector6<f64> {
     let mut sum = Vector6::zeros();
     for (k, (time, pose)) in others.iter().enumerate() {
+        // The derivative of Lagrange's basis polynomial of this pose at time 0.
         let rest = others.iter().enumerate().filter(|&(l, _)| l != k).map(|(_, (other, _))| other);
         let weight: f64 = rest.map(|other| other / (other - time)).product();
         sum += mid.tangent_to(pose) * (weight / time);

@@ -274,6 +274,7 @@ impl Program {
         )
         .map_err(|error| error.to_string())?;
         solver.solve();
+        // A solution that is almost optimal is one: its tolerance is a few times as large.
         match solver.solution.status {
             SolverStatus::Solved | SolverStatus::AlmostSolved => Ok(solver.solution.x[..wanted].to_vec()),
             status => Err(format!("{status:?}")),

@@ -83,6 +83,7 @@ impl<'a> Screen<'a> {
         let beside = self.before(k, None).take(1).chain(self.after(k, None).take(1));
         let free = |l: &usize| !self.measured[*l].held.place;
         let candidates: Vec<usize> = [k].into_iter().chain(beside.filter(free)).collect();
+        // The largest error that is left among the others without one of them.
         let disagreement = |&absent: &usize| {
             let others = candidates.iter().filter(|&&other| other != absent);
             others.flat_map(|&other| self.errors(other, Some(absent), false)).fold(0.0, f64::max)

@@ -84,6 +84,7 @@ impl KeyframeDeblurrer {
         if self.rolls() && reblurred.is_none() {
             return Ok(sharp);
         }
+        // The blur of this exposure, from its path and the depth of the frame.
         let mut arena = Arena::new(&mut memory.0);
         let mut scratch = DeblurScratch::carve(&mut arena, frame.width, frame.height)?;
         let mut rectify =
@@ -102,6 +103,7 @@ impl KeyframeDeblurrer {
             self.linearise(rgb, channel, &mut plane);
             plane
         };
+        // What the captured picture has beyond the blurred one of the map: in light, where blur is linear.
         let captured = [0, 1, 2].map(|channel| light(&frame.rgb, channel));
         let shown = [0, 1, 2].map(|channel| light(&sharp, channel));
         let mut left_over = match reblurred {
@@ -111,6 +113,7 @@ impl KeyframeDeblurrer {
                 differences(&captured, &light, &vec![1.0; pixels])
             }
         };
+        // Only what stands out of the noise comes back, against the blur, to where it lies at mid exposure.
         hold_back_noise(&mut left_over, &captured, &frame.rgb, frame.width);
         let mut rgb = sharp;
         for (channel, (mut shown, left_over)) in shown.into_iter().zip(left_over).enumerate() {

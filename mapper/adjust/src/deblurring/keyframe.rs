@@ -258,6 +258,7 @@ impl FramePath {
             return Self { reference_from_camera, timing: FrameTiming::GLOBAL };
         }
         let path = BowedTrajectory::through(&exposure.start, &exposure.mid, &exposure.end);
+        // Times in units of the exposure, of which the path is the unit.
         let timing = FrameTiming {
             exposure: 1.0,
             readout: readout.colour / span,

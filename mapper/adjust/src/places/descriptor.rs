@@ -63,15 +63,18 @@ impl PlaceDescriptor {
                 height: image_height,
             });
         }
+        // The thumbnail has the shape of the image, and blur no place in it.
         let height = (COLUMNS * image_height).div_ceil(image_width.max(1));
         if image_width < COLUMNS || image_height < height || height < COLUMNS / 4 {
             return Err(PlaceError::TooSmall { width: image_width, height: image_height });
         }
         let size = [COLUMNS, height];
         let thumbnail = shrunk(rgb, [image_width, image_height], size);
+        // A band of frequencies: differences of two blurs know neither brightness nor pixels.
         let (fine, coarse) = (blurred(&thumbnail, size, FINEST), blurred(&thumbnail, size, COARSEST));
         let values = normalised(fine.iter().zip(&coarse).map(|(fine, coarse)| fine - coarse).collect());
         let scale = |size: usize, image_size: usize| size as f64 / image_size as f64;
+        // Focal lengths of the thumbnail, for the turn between two of them.
         let focal = [camera.fx * scale(COLUMNS, image_width), camera.fy * scale(height, image_height)];
         Ok(Self { width: COLUMNS, height, values, focal })
     }

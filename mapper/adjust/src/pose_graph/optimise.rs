@@ -30,6 +30,7 @@ impl PoseGraph {
         self.check()?;
         let mut solver = Solver::new(self, settings);
         let initial_cost = solver.truncated_cost();
+        // Which edges are mistakes is decided first, then the rest is solved, then what agrees after all comes back.
         solver.graduate();
         let mut converged = solver.descend(settings.max_iterations);
         for _ in 0..MAX_READMISSIONS {
@@ -81,6 +82,7 @@ impl PoseGraph {
             neighbours[edge.to].push(edge.from);
         }
         let mut reached = vec![false; neighbours.len()];
+        // A search from the first node: what it does not reach has nothing to hold it.
         let mut open = Vec::from_iter(reached.first_mut().map(|first| {
             *first = true;
             0
@@ -131,6 +133,7 @@ impl<'g> Solver<'g> {
         if robust.is_empty() {
             return;
         }
+        // Graduated non-convexity: from a cost that is nearly quadratic for all edges to one that is truncated.
         let mut graduation = Graduation::new(self.settings.rejection_cost, largest);
         loop {
             for &k in &robust {
@@ -139,10 +142,12 @@ impl<'g> Solver<'g> {
             if graduation.is_tight() || robust.iter().all(|&k| matches!(self.weights[k], 0.0 | 1.0)) {
                 break;
             }
+            // The poses follow a little before edges are judged more strictly.
             self.descend(ITERATIONS_PER_GRADUATION);
             graduation.tighten();
         }
         for &k in &robust {
+            // What was still undecided at the end counts or does not.
             self.weights[k] = self.weights[k].round();
         }
     }

@@ -38,6 +38,7 @@ impl NormalEquations {
     pub(super) fn add(&mut self, edge: &LinearEdge, weight: f64, from: Option<usize>, to: Option<usize>) {
         for (node, jacobian) in [(from, &edge.jacobian_from), (to, &edge.jacobian_to)] {
             if let Some(node) = node {
+                // H += w J^T J, b -= w J^T r, block by block.
                 self.diagonal[node] += jacobian.transpose() * jacobian * weight;
                 let descent: Vector6<f64> = jacobian.transpose() * edge.residual * -weight;
                 for (k, value) in descent.iter().enumerate() {
@@ -77,12 +78,14 @@ impl NormalEquations {
         for node in 0..self.diagonal.len() {
             let mut block = self.diagonal[node];
             for k in 0..DEGREES {
+                // Levenberg and Marquardt; the floor holds directions that no edge measures.
                 block[(k, k)] += damping * block[(k, k)] + FLOOR;
             }
             self.push(node, node, &block);
         }
         let matrix = CscMatrix::new_from_triplets(size, size, self.rows, self.columns, self.values);
         let settings = QDLDLSettings { regularize_enable: false, ..QDLDLSettings::default() };
+        // L D L^T of the sparse matrix.
         let mut factors = QDLDLFactorisation::new(&matrix, Some(settings)).ok()?;
         factors.solve(&mut self.descent);
         let steps = self.descent.chunks_exact(DEGREES).map(Vector6::from_column_slice);

@@ -66,6 +66,7 @@ fn payload<'a>(path: &Path, identity: &Identity, bytes: &'a [u8]) -> Result<&'a 
         return Err(BinaryFileError::Length { path, expected, found }.into());
     };
     check_version(path, "the checkpoint layout", VERSION, u32::from_le_bytes(field(header, VERSION_AT)))?;
+    // Cut or damaged files are told from those of other runs before anything is decoded.
     let expected = u64::from_le_bytes(field(header, LENGTH_AT)).saturating_add(HEADER_LEN as u64);
     check_length(path, expected, found)?;
     let expected = u32::from_le_bytes(field(header, CHECKSUM_AT));

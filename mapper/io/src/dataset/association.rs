@@ -5,6 +5,7 @@
 /// `a`.
 pub(super) fn associate(a: &[f64], b: &[f64], tolerance: f64) -> Vec<(usize, usize)> {
     let mut candidates = Vec::new();
+    // All pairs within the tolerance, in one pass over both lists.
     let mut first = 0;
     for (i, time) in a.iter().enumerate() {
         while first < b.len() && b[first] < time - tolerance {
@@ -15,6 +16,7 @@ pub(super) fn associate(a: &[f64], b: &[f64], tolerance: f64) -> Vec<(usize, usi
     }
     candidates.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)).then(x.2.cmp(&y.2)));
 
+    // The closest of them first; ties by the order of the lists.
     let (mut a_taken, mut b_taken) = (vec![false; a.len()], vec![false; b.len()]);
     let mut pairs = Vec::with_capacity(a.len().min(b.len()));
     for (_, i, j) in candidates {

@@ -393,6 +393,7 @@ pub fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
     if camera.width * camera.height > MAX_PIXELS {
         return Err(invalid("width", camera.width, "a size of at most 64 million pixels"));
     }
+    // The comparisons are written so that NaN is refused.
     let (width, height) = (camera.width as f64, camera.height as f64);
     for (key, focal) in [("fx", camera.fx), ("fy", camera.fy)] {
         if !(focal > 1.0 && focal <= MAX_FOCAL_IN_WIDTHS * width) {

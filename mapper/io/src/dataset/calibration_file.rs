@@ -111,6 +111,7 @@ fn calibration(
     let [k1, k2, p1, p2, k3] = keys.distortion.unwrap_or_default();
     let lens = Distortion { k1, k2, p1, p2, k3 };
     let frame_rate = keys.frame_rate.unwrap_or_else(|| assumed_rate(measured_rate, warnings));
+    // What has to be there, then what may be there, each with a note of where it comes from.
     let mut calibration = Calibration::of_geometry(camera, lens, keys.depth_scale, frame_rate);
     calibration.sources = sources(&keys).map_err(located)?;
     if let Some(seconds) = keys.exposure_seconds {
@@ -207,6 +208,7 @@ fn response(
     match name.as_deref() {
         Some("srgb") => Ok(Response::Srgb),
         Some("linear") => Ok(Response::Linear),
+        // A table beside the calibration.
         Some(file) if file.ends_with(".csv") || file.ends_with(".txt") => {
             Ok(Response::Table(Box::new(response_table::read(&path.with_file_name(file))?)))
         }

@@ -29,9 +29,11 @@ pub(super) fn read(
     }
     let (times, exposures) = read_exposure_times(&path)?;
     let frame_times: Vec<f64> = entries.iter().map(|entry| entry.timestamp).collect();
+    // Half an interval: no row can belong to two frames.
     for (frame, row) in associate(&frame_times, &times, 0.5 / calibration.frame_rate) {
         entries[frame].exposure_seconds = Some(exposures[row]);
     }
+    // Frames without a row get the time of the calibration, and the user is told how many.
     let mut missing = entries.iter_mut().filter(|entry| entry.exposure_seconds.is_none()).peekable();
     if let Some(first) = missing.peek().map(|entry| entry.timestamp) {
         let fallback = calibration.fallback_exposure_seconds();

@@ -213,6 +213,7 @@ impl Scan<'_> {
         let mut means = vec![0; self.parts.len()];
         let mut block = 0;
         for unit in 0..self.units {
+            // Between two restarts the data are those of a scan of its own: byte by byte, means from zero.
             if self.restarts > 0 && unit > 0 && unit % self.restarts == 0 {
                 check_end(&bits, block)?;
                 if !bits.restart() {
@@ -222,6 +223,7 @@ impl Scan<'_> {
             }
             for (part, mean) in self.parts.iter().zip(&mut means) {
                 for _ in 0..part.blocks {
+                    // Blocks are counted from 1 in messages.
                     block += 1;
                     bits.block(part, mean).map_err(|damage| match damage {
                         BlockDamage::Ends => ScanDamage::Ends { block, blocks },

@@ -23,6 +23,7 @@ pub(super) fn pair(
     warnings: &mut Vec<Warning>,
 ) -> Result<Vec<(usize, FrameEntry)>, DatasetError> {
     let (colours, depths) = (list(colour)?, list(depth)?);
+    // Both lists are in the order of their numbers.
     let partner = |number: &usize, others: &[(usize, PathBuf)]| {
         others.binary_search_by_key(number, |(number, _)| *number).ok()
     };
@@ -39,6 +40,7 @@ pub(super) fn pair(
     let value = format!("image number / {frame_rate}");
     warnings.push(Warning::Assumed { key: "the time of each frame", value });
     for (folder, images, others) in [(colour, &colours, &depths), (depth, &depths, &colours)] {
+        // One sentence for all images of a folder that have no partner.
         let mut alone = images.iter().filter(|(number, _)| partner(number, others).is_none());
         if let Some((_, first)) = alone.next() {
             let (folder, count) = (folder.path.to_owned(), 1 + alone.count());

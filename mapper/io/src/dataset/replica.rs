@@ -47,6 +47,7 @@ pub(super) fn recognise(folder: &Path) -> bool {
 /// Reads images, camera and trajectory. A `calibration.toml` in the folder takes the place of the camera file.
 pub(super) fn read(folder: &Path) -> Result<Contents, DatasetError> {
     let mut warnings = Vec::new();
+    // What the user wrote comes before what the benchmark has.
     let own_calibration = folder.join(calibration_file::FILE_NAME);
     let mut calibration = if own_calibration.is_file() {
         calibration_file::read(&own_calibration, None, &mut warnings)?

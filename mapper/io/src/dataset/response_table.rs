@@ -35,6 +35,7 @@ fn read_codes(file: &TextFile, path: &Path) -> Result<InverseResponse, FileError
     for line in file.lines() {
         for field in line.fields() {
             let value = line.number(field, EXPECTED)? as f32;
+            // Equal lights of two codes could not be told apart again.
             let increases = values.last().is_none_or(|previous| value > *previous);
             if !increases || value < 0.0 || values.len() == 256 {
                 return Err(line.malformed(EXPECTED));

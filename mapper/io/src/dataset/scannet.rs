@@ -41,6 +41,7 @@ pub(super) fn read(folder: &Path) -> Result<Contents, DatasetError> {
     )?;
     let colour_images = numbered.iter().map(|(_, entry)| entry.colour.as_path());
     let depth_images = numbered.iter().map(|(_, entry)| entry.depth.as_path());
+    // Colour has another camera; it is resampled to that of depth.
     let colour_camera = read_camera(&intrinsics.join("intrinsic_color.txt"), colour_images)?;
     let camera = read_camera(&intrinsics.join("intrinsic_depth.txt"), depth_images)?;
     let ground_truth = read_poses(&poses, &numbered, &mut warnings)?;
@@ -97,6 +98,7 @@ fn read_poses(
             Err(error) => return Err(error.into()),
         }
     }
+    // Frames that the benchmark could not place have infinite poses.
     let count = missing.len();
     if let Some(first) = missing.into_iter().next() {
         warnings.push(Warning::PosesMissing { count, first });

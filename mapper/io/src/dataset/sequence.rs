@@ -133,9 +133,11 @@ impl Dataset {
                 expected: "one number, as there is none for each frame",
             }));
         }
+        // Times of single frames would take precedence over the one that was given.
         if !is_per_frame {
             entries.iter_mut().for_each(|entry| entry.exposure_seconds = None);
         }
+        // Everything is looked at again, as when the folder was opened.
         let contents = Contents {
             calibration,
             colour_camera: self.colour_camera,
@@ -371,6 +373,7 @@ impl Dataset {
         let frame_rate = self.calibration.frame_rate;
         let interval = 1.0 / frame_rate;
         let times: Vec<f64> = self.entries.iter().map(|entry| entry.timestamp).collect();
+        // A factor of two is no drift of a clock: one of the numbers is wrong.
         if let Some(measured) = frames_per_second(&times)
             && !(0.5..=2.0).contains(&(measured / frame_rate))
         {
@@ -389,6 +392,7 @@ impl Dataset {
             self.warnings.push(Warning::Assumed { key: "exposure_seconds", value });
         }
         let exposure = self.entries.iter().map(|entry| self.entry_exposure(entry)).fold(0.0, f64::max);
+        // A thousandth for what was rounded.
         if exposure > interval * 1.001 {
             self.warnings.push(Warning::ExposureTooLong { exposure, interval });
         }

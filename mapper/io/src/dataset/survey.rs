@@ -31,6 +31,7 @@ pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
     for k in 0..sampled {
         match dataset.frame(k * dataset.len() / sampled) {
             Ok(frame) => {
+                // Black is a lens cap, plain a wall or an image that is empty.
                 let [mean, deviation] = brightness(&frame.rgb);
                 black += usize::from(mean < BLACK);
                 plain += usize::from(deviation < PLAIN);

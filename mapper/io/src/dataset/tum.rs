@@ -133,6 +133,7 @@ fn associate_lists(
     let times = |list: &[ListedImage<'_>]| list.iter().map(|image| image.timestamp).collect::<Vec<_>>();
     let (colour_times, depth_times) = (times(&colour), times(&depth));
 
+    // The closest pairs first, each image once.
     let pairs = associate(&colour_times, &depth_times, tolerance);
     if pairs.is_empty() {
         return Err(DatasetError::NoAssociation {
@@ -144,6 +145,7 @@ fn associate_lists(
             closest: closest(&colour_times, &depth_times),
         });
     }
+    // What has no partner is told for each list.
     let matched = |side: fn(&(usize, usize)) -> usize| pairs.iter().map(side).collect::<Vec<_>>();
     warnings.extend(unmatched(&colour_list, &colour_times, &matched(|pair| pair.0), tolerance));
     warnings.extend(unmatched(&depth_list, &depth_times, &matched(|pair| pair.1), tolerance));
@@ -226,9 +228,11 @@ fn read_ground_truth(
     let poses = if poses_path.is_file() {
         sound(read_recorded_trajectory(&poses_path)?, warnings)
     } else {
+        // Exposures have poses at mid exposure, which are ground truth as well.
         let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };
         exposures.iter().map(mid).collect()
     };
+    // Truth of another time belongs to another recording, or to another clock.
     if let (Some(first), Some(last), [first_frame, .., last_frame]) = (poses.first(), poses.last(), entries)
         && (last.timestamp < first_frame.timestamp || first.timestamp > last_frame.timestamp)
     {

@@ -51,8 +51,10 @@ pub(crate) fn read_folder(
             continue;
         }
         let Samples { angular_velocities, specific_forces } = read(&path, form)?;
+        // Everything is turned into the axes of the camera.
         let camera_from_imu = imu_from_camera.copied().unwrap_or_else(|| usual_axes(form)).inverse();
         let read = ImuRecording::new(angular_velocities, specific_forces).seen_from(&camera_from_imu);
+        // The first file that has something counts.
         if rates.is_empty() {
             rates = read.angular_velocities().to_vec();
         }
@@ -137,6 +139,7 @@ fn read_named(file: &TextFile, path: &Path) -> Result<Samples, FileError> {
         _ => None,
     };
     let (rates, forces) = (positions(RATE_COLUMNS), positions(FORCE_COLUMNS));
+    // A file may hold one of the two sensors, or both.
     let time = position("timestamp").filter(|_| rates.is_some() || forces.is_some());
     let Some(time) = time else { return Err(header.malformed(HEADER)) };
     collect(lines, |line| {

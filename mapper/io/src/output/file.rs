@@ -103,6 +103,7 @@ impl OutputFile {
                 opened.and_then(|mut stream| stream.write_all(content)).map_err(unwritable)
             }
             Target::Stdout => match io::stdout().lock().write_all(content) {
+                // `| head` has seen enough.
                 Err(reason) if reason.kind() != io::ErrorKind::BrokenPipe => Err(unwritable(reason)),
                 _ => Ok(()),
             },

@@ -139,6 +139,7 @@ impl<'a> Header<'a> {
         if !bytes.starts_with(super::MAGIC) || lines.next()? != "ply" {
             return Err(PlyError::NotPly { path: path.to_owned() });
         }
+        // Lines of words until the end of the header; properties belong to the element before them.
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
         loop {
@@ -170,6 +171,7 @@ impl<'a> Header<'a> {
             let element = elements.last_mut().ok_or_else(|| lines.error("an element first", line))?;
             element.properties.push(property);
         }
+        // Without its format the body means nothing.
         let encoding = encoding.ok_or_else(|| lines.error("a line \"format\" before", "end_header"))?;
         Ok(Self { encoding, body: lines.rest, elements })
     }

@@ -107,6 +107,7 @@ pub(super) fn check_data_set(
 ) -> Result<(), ExportError> {
     let folder = || dataset.folder().to_owned();
     let PinholeCamera { width, height, fx, fy, cx, cy } = dataset.calibration().camera;
+    // The run was made with this camera, to the digits that its summary has.
     let values = [
         ("width", width as f64, camera.width as f64),
         ("height", height as f64, camera.height as f64),
@@ -124,6 +125,7 @@ pub(super) fn check_data_set(
         let (found, expected) = (dataset.len(), run.frames.len());
         return Err(ExportError::Frames { dataset: folder(), found, expected });
     }
+    // Index and time: the data set may have lost or gained frames in the meantime.
     for frame in frames {
         let (index, expected) = (frame.index, frame.timestamp);
         let found = dataset.timestamp(index);

@@ -38,6 +38,7 @@ impl PosedFrames {
             return Err(ExportError::Rows { folder: run.folder.clone(), exposures, frames });
         }
         let all = run.exposures.iter().zip(&run.frames).enumerate();
+        // A lost frame holds the pose of the one before: other programs would take it for seen.
         let found = all.filter(|(_, (_, record))| record.status != FrameStatus::Lost);
         let frames: Vec<_> = found
             .map(|(index, (exposure, record))| PosedFrame {

@@ -59,6 +59,7 @@ impl<'a> SceneExport<'a> {
         images: ExportedImages,
         map: Option<&Gaussians>,
     ) -> Result<Self, ExportError> {
+        // Lost frames have no pose of their own; others can be left out.
         let PosedFrames { mut frames, lost } = PosedFrames::of(run)?;
         if images == ExportedImages::Keyframes {
             frames.retain(|frame| frame.is_keyframe);
@@ -131,7 +132,9 @@ impl<'a> SceneExport<'a> {
         }
         let reader = self.reader(dataset);
         let (pinhole, mut from_depth) = (self.camera.pinhole(), Mesh::default());
+        // Columns and rows between two points from depth, so that their number is bounded.
         let step = depth_step(&pinhole, self.frames.len());
+        // Images are read and encoded side by side, a few at a time, and written in order.
         for frames in self.frames.chunks(FRAMES_AT_A_TIME) {
             let read = |frame| reader.read(frame).and_then(|images| self.encode(frame, images));
             let encoded: Vec<Result<Encoded, ExportError>> = frames.par_iter().map(read).collect();

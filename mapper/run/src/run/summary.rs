@@ -184,6 +184,7 @@ impl Summary {
     pub(super) fn of(settings: &RunSettings, frames: &[FrameRecord], skipped: usize) -> Self {
         let count = |status| frames.iter().filter(|f| f.status == status).count();
         let times: Vec<f64> = frames.iter().map(|f| f.ms).collect();
+        // The blur of a lost frame is that of the one before.
         let blurs: Vec<f64> =
             frames.iter().filter(|f| f.status != FrameStatus::Lost).map(|f| f.blur_px).collect();
         Self {
@@ -201,6 +202,7 @@ impl Summary {
             deblurred_keyframes: 0,
             milliseconds: Spread::of(&times),
             blur_px: Spread::of(&blurs),
+            // Figures of merit come with the end of the run.
             trajectory: None,
             blur: None,
             map: None,

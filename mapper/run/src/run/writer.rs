@@ -84,11 +84,13 @@ impl RunWriter {
             return Ok(());
         }
         remove_keyframe_images(self.folder())?;
+        // A map of the earlier run would be taken for one of this run.
         [MAP_FILE, FIELD_FILE].iter().try_for_each(|name| remove(&self.folder().join(name)))
     }
 
     /// Whether enough frames were found to take the place of an earlier run.
     fn is_proven(&self) -> bool {
+        // Two frames: a single one agrees with itself.
         let tracked = self.frames.iter().filter(|frame| frame.status != FrameStatus::Lost);
         tracked.take(FRAMES_THAT_PROVE).count() == FRAMES_THAT_PROVE
     }

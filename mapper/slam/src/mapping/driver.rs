@@ -134,11 +134,13 @@ impl Conclusion<'_> {
         let started = Instant::now();
         let dataset = self.dataset;
         self.frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
+        // Frames between keyframes follow; then what does not fit its neighbours is repaired.
         let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, self.fit);
         let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
         let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
         repairs.into_iter().for_each(|repair| writer.warn(repair));
         output::write(&mut writer, dataset, &mut bundle, &exposures, &refined)?;
+        // Figures need the files, and close the summary.
         let figures = MapFigures {
             gaussians: bundle.state.map.size().gaussians(),
             map_file_bytes: writer.map_bytes(),
@@ -149,6 +151,7 @@ impl Conclusion<'_> {
             keyframes: bundle.keyframes().len(),
             ..picture_figures::image_figures(dataset, &bundle, writer.folder(), &exposures)
         };
+        // Against the truth, where it is on record.
         let merit = Merit::of(&exposures, dataset);
         let summary = writer.finish(|summary| {
             summary.trajectory = merit.trajectory;

@@ -45,12 +45,14 @@ pub(super) fn all_exposures(
     let sensor = sensor(dataset);
     let mut all = Vec::with_capacity(dataset.len());
     for index in 0..frames.exposures.len() {
+        // Keyframes were refined themselves.
         let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
         if keyframes[next] == index {
             let state = &bundle.state.frames[next];
             all.push((frames.exposure_of(index, state), state.log_gain));
             continue;
         }
+        // Others move along with the keyframe next to them, as far as it was moved.
         let nearest = nearest(&keyframes, next, index);
         let before = &frames.exposures[keyframes[nearest]].mid;
         let reference = &bundle.state.frames[nearest];
@@ -67,6 +69,7 @@ pub(super) fn all_exposures(
                 PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },
             );
             let known = &bundle.keyframes()[nearest].observation;
+            // The gain from the same surfaces in both pictures, where exposure control changed it noticeably.
             let here = Placed { seen: unmapped.observation.level(1), world_from_camera: state.path.mid() };
             let there =
                 Placed { seen: known.level(1), world_from_camera: bundle.state.frames[nearest].path.mid() };
@@ -75,6 +78,7 @@ pub(super) fn all_exposures(
             {
                 state.log_gain += ratio;
             }
+            // The map stays, the path follows its picture.
             bundle.fit_frame(&unmapped, &mut state, STEPS);
         }
         all.push((frames.exposure_of(index, &state), state.log_gain));

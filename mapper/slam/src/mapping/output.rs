@@ -47,6 +47,7 @@ pub(super) fn write(
     let count = bundle.keyframes().len();
     for first in (0..count).step_by(TOGETHER) {
         let keyframes = first..count.min(first + TOGETHER);
+        // The map renders one picture after the other, on all threads; deblurring then takes one per thread.
         let explained: Vec<_> = keyframes.map(|k| (k, explained(bundle, k))).collect();
         let pictures = Pictures { dataset, bundle: &*bundle, refined, deblurrer: &deblurrer };
         let shared = &*writer;

@@ -66,6 +66,7 @@ impl Frames {
         let settings = ContinuitySettings::default();
         let evidence = FrameEvidence::new(dataset);
         let compare = |suspicion: &Suspicion<'_>| evidence.compare(suspicion);
+        // Repairs first: predictions look at the repaired neighbours.
         let repaired = repair_run(exposures, records, &seconds, &settings, &compare)?;
         let frames = run_frames(&repaired.exposures, records, &seconds)?;
         let motions = predict_motions(&frames, &settings).into_iter();
@@ -87,6 +88,7 @@ impl Frames {
     ) -> Self {
         let sensor = sensor(dataset);
         let stretch = |index: usize| {
+            // How much longer than the exposure the time is in which rows and depth are measured.
             let offset = dataset.depth_timestamp(index) - dataset.timestamp(index);
             sensor.times(dataset.exposure_seconds(index), offset).1
         };
@@ -95,6 +97,7 @@ impl Frames {
         let paths: Vec<ExposurePath> = (0..exposures.len())
             .map(|index| {
                 let seconds = dataset.exposure_seconds(index);
+                // Lost frames hold a pose, and say nothing of the acceleration.
                 let beside =
                     |other: Option<usize>| other.filter(|k| tracked(*k)).and_then(|k| exposures.get(k));
                 let neighbours =
@@ -103,6 +106,7 @@ impl Frames {
             })
             .collect();
         for ((prior, path), stretch) in priors.iter_mut().zip(&paths).zip(&stretches) {
+            // Priors of motions are over the same time as the paths.
             if *stretch != 1.0 {
                 prior.middle = path.ends.mid();
                 prior.motion = prior.motion.map(|motion| motion.times(*stretch));
@@ -150,6 +154,7 @@ pub(super) fn bundle(
 ) -> Result<BundleAdjustment, MapError> {
     let sensor = sensor(dataset);
     let chosen = choose_keyframes(&frames.records, settings.max_keyframes);
+    // Images are read side by side, and kept in the order of the frames.
     let load = |&index: &usize| (index, observation(dataset, &sensor, index));
     let loaded: Vec<_> = chosen.par_iter().map(load).collect();
     let mut keyframes = Vec::new();
@@ -184,6 +189,7 @@ fn set_gains(sensor: &Sensor, keyframes: &[MapKeyframe], states: &mut [FrameStat
         })
         .collect();
     let mut log_gains = vec![0.0];
+    // Ratios between neighbours add up along the sequence.
     ratios.iter().for_each(|ratio| log_gains.push(log_gains[log_gains.len() - 1] + ratio));
     if log_gains.iter().any(|log_gain| log_gain.abs() > NOTICEABLE) {
         let median = quantile(&log_gains, 0.5).unwrap_or(0.0);
@@ -204,9 +210,11 @@ fn long_path(
         return path;
     }
     let mid = exposure.mid;
+    // The straight motion goes on to both ends of the longer path.
     let half_motion = motion_of(exposure).motion() * (0.5 * stretch);
     let acceleration = match neighbours {
         [Some(before), Some(after)] => {
+            // Second difference of three poses at uneven times.
             let rate = |other: &TimedExposure| {
                 let time = other.timestamp - exposure.timestamp;
                 (mid.tangent_to(&other.mid) / time, time)

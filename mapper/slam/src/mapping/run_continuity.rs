@@ -61,6 +61,7 @@ pub fn run_frames(
         let [exposures, records, seconds] = lengths;
         return Err(ContinuityError::Lengths { exposures, records, seconds });
     }
+    // Noise is relative to what is usual in this run: the scale of residuals depends on the scene.
     let residuals: Vec<f64> = records.iter().map(|record| record.residual).collect();
     let usual_residual = quantile(&residuals, 0.5).unwrap_or(0.0);
     let given = exposures.iter().zip(records).zip(exposure_seconds);

@@ -182,6 +182,7 @@ impl BackEnd {
     /// Adds a frame to the run; returns its exposure.
     fn record(&mut self, frame: &TrackedFrame) -> Result<TimedExposure, RunError> {
         let exposure = self.in_this_world(&frame.exposure, frame.moves);
+        // The frame before is moved as the world has been since.
         if let Some((index, revised, blur_px)) = &frame.revision {
             let revised = self.in_this_world(revised, frame.moves);
             self.writer.revise(*index, revised, *blur_px);
@@ -249,6 +250,7 @@ impl BackEnd {
 
     /// Moves map and run if the newest keyframe shows that they have drifted; returns what happened around it.
     fn close_loop(&mut self, image: &RgbdFrame) -> Option<RigidTransform> {
+        // Map, run and tracker move together; frames that are on their way are moved when they arrive.
         let poses = self.loops.correct(&self.map, image)?;
         let moves = self.map.bundle.move_keyframes(&poses);
         self.writer.move_world(|index| moves.of(index));
@@ -264,6 +266,7 @@ impl BackEnd {
         self.undisputed += 1;
         if self.undisputed >= JUDGE_EVERY {
             self.undisputed = 0;
+            // Whichever explains the picture better is the reference for the next frames.
             let was_on_map = self.on_map;
             let (is_better, keyframe) = self.judge(pose, image);
             self.on_map = is_better;
@@ -286,6 +289,7 @@ impl BackEnd {
         let mut residual = |view: &SharpView| {
             relocaliser.align_to(image, view, pose).map(|measurement| measurement.residual)
         };
+        // Both are aligned with the same frame from the same pose.
         let on_keyframe = residual(&keyframe_view);
         let on_map = self.map.sharp_view(pose).and_then(|view| residual(&view));
         let is_better = match (on_map, on_keyframe) {

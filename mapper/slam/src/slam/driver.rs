@@ -102,6 +102,7 @@ impl SlamRun<'_> {
             Some((parts, state)) => back_end.restore(dataset, parts, state)?,
             None => Replay::default(),
         };
+        // Two threads: the tracker ends when the data set does or nobody listens, the mapper when no frame comes.
         let (tracker_link, mapper_link) = link();
         let disagreement = thread::scope(|scope| {
             let tracking =
@@ -112,6 +113,7 @@ impl SlamRun<'_> {
             Ok::<_, SlamError>(tracked?)
         })?;
         let live_seconds = earlier + started.elapsed().as_secs_f64();
+        // The whole map is known only now.
         back_end.find_lost(dataset);
         let (grown, mut writer, figures, keeper) = back_end.finish();
         if let Some(lag) = depth_lag_of_tracked(dataset, disagreement) {

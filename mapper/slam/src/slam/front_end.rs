@@ -79,6 +79,7 @@ pub(super) fn run(
     let pace = Pace::new(arrival, dataset.timestamp(0), 1.0 / dataset.calibration().frame_rate);
     for index in 0..dataset.len() {
         let arrived = pace.wait_for(dataset.timestamp(index));
+        // What a run that was stopped was told is told again; the mapper only gets frames that are new to it.
         let told_before = index.checked_sub(AHEAD).filter(|told| replay.has(*told));
         let instructions = match told_before {
             Some(told) => Some(vec![replay.take(told)]),
@@ -106,6 +107,7 @@ impl FrontEnd<'_, '_> {
 
     fn track(&mut self, index: usize, instructions: Vec<Instruction>) -> TrackedFrame {
         let begin = Instant::now();
+        // Moves of the world and views first, so that the frame is tracked in the world as it is now.
         let followed = instructions.into_iter().try_for_each(|instruction| self.follow(instruction));
         let following = begin.elapsed();
         let image = match (followed, self.dataset.frame(index)) {
@@ -126,6 +128,7 @@ impl FrontEnd<'_, '_> {
         let ms = (begin.elapsed() + following).as_secs_f64() * 1e3;
         self.given.push(index);
         self.uncertainty.add(&result);
+        // Indices of the tracker become those of the data set.
         let revision = result.revision.as_ref().and_then(|revision| {
             let revised = self.given.index(revision.index)?;
             let timestamp = self.dataset.timestamp(revised);

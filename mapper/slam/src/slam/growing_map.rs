@@ -101,6 +101,7 @@ impl GrowingMap {
         let camera = self.sensor.camera;
         let near = neighbours(&self.bundle, &exposure.mid, &camera);
         let blur_px = if blur_px.is_finite() { blur_px } else { 0.0 };
+        // A new view, a much sharper one, or an area that the map does not have yet.
         let wanted = is_worth_it(&self.bundle, near.first(), blur_px, camera.width)
             || self.bundle.uncovered_fraction(&exposure.mid, COARSE) > NEW_AREA;
         if !wanted {
@@ -111,9 +112,11 @@ impl GrowingMap {
         let path = if self.settings.blur { path } else { ExposurePath::still(path.mid()) };
         let prior = PathPrior { middle: path.ends.mid(), motion: None };
         let mut state = FrameState::new(path);
+        // The gain of the keyframe next to it, but for what exposure control changed.
         state.log_gain = near.first().map_or(0.0, |near| self.log_gain(near.keyframe, &observation, &state));
         self.bundle.push(MapKeyframe::new(image.index, observation, prior), state);
         self.seed();
+        // One in, one out, when there is no more room.
         if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
             && let Some(k) = most_dispensable(&self.bundle, &camera)
         {
@@ -128,6 +131,7 @@ impl GrowingMap {
         let (known, state) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
         let there = Placed { seen: known.observation.level(COARSE), world_from_camera: state.path.mid() };
         let here = Placed { seen: observation.level(COARSE), world_from_camera: frame.path.mid() };
+        // What the adjustment finds itself is left to it.
         let ratio = log_brightness(&self.sensor.inverse_response, there, here).unwrap_or(0.0);
         state.log_gain + if ratio.abs() > NOTICEABLE { ratio } else { 0.0 }
     }

@@ -115,8 +115,10 @@ impl Loops {
         }
         let keyframes = map.bundle.keyframes();
         let newest = keyframes.len().checked_sub(1)?;
+        // Keyframes just before are always similar, and say nothing about drift.
         let old: Vec<usize> = keyframes[..newest.saturating_sub(RECENT)].iter().map(|k| k.index).collect();
         let (before, view, measurement) = self.recognise(map, image, |id| old.contains(&id))?;
+        // Where the map says that the newest keyframe is, in pixels from where the old place says it is.
         let now = map.bundle.state.frames[newest].path.mid();
         let depth = keyframes[newest].depth;
         let camera = &map.sensor.camera;
@@ -124,11 +126,13 @@ impl Loops {
             self.pause = PAUSE;
             return None;
         }
+        // All closures so far count again: the graph may find a mistake among them.
         let before_from_now = view.world_from_camera.inverse().compose(&measurement.world_from_camera);
         self.closed.push(Closure { before, now: image.index, before_from_now });
         let mut graph = self.graph(map);
         let report = graph.optimise(&PoseGraphSettings::default()).ok()?;
         let last = graph.edges.len().checked_sub(1)?;
+        // The new one contradicts the rest.
         if report.rejected.contains(&last) {
             self.closed.pop();
             return None;
@@ -162,6 +166,7 @@ impl Loops {
         let world_from_keyframe: Vec<RigidTransform> = states.iter().map(|state| state.path.mid()).collect();
         let odometry = world_from_keyframe.windows(2).enumerate().map(|(from, pair)| {
             let from_from_to = pair[0].inverse().compose(&pair[1]);
+            // Drift grows with the way.
             let (metres, radians, share) = ODOMETRY;
             PoseGraphEdge {
                 from,

@@ -66,6 +66,7 @@ impl Relocaliser {
         state: &FrameState,
         depth_scale: f64,
     ) -> SharpView {
+        // What was captured, without the blur of its refined path; as captured where that is not possible.
         let image = keyframe.observation.level(0).frame(keyframe.index, depth_scale);
         let exposure = state.path.stretched(keyframe.observation.level(0).times.exposure).timed(0.0);
         let deblurred = self.deblurrer.deblur(&image, &exposure, &mut self.deblur_memory);

@@ -13,6 +13,7 @@ use crate::round::Round;
 
 pub(super) fn build(motion: CameraMotion) -> Scene {
     let mut things = Vec::new();
+    // Two rows of five columns, 2.1 m apart.
     for row in [-2.6, 2.6] {
         for place in 0..5_u32 {
             things.extend(column(row, -3.0 + 2.1 * place as f32, place));
@@ -80,6 +81,7 @@ fn exhibits() -> Vec<Thing> {
     for (index, (x, z, degrees)) in (0_u32..).zip(pedestals) {
         things.push(Thing::cuboid(x, 0.0, z, [0.6, 0.9, 0.6], degrees, stone));
         let globe = Material::Marble { base: colour(0x52779a), vein: colour(0xe0c27a) };
+        // Globes and plants by turns.
         things.push(match index % 2 {
             0 => Thing::sphere(x, 1.2, z, 0.3, globe),
             _ => Thing::column(x, 0.9, z, 0.2, 0.6, Material::Foliage),

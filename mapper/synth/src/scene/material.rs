@@ -107,9 +107,11 @@ fn plaster(uv: Vec2, colour: Vec3, stain: f32, pixel: f32) -> Vec3 {
 /// Running bond, bricks 21 x 6.5 cm with 1.2 cm joints.
 fn bricks(uv: Vec2, brick: Vec3, mortar: Vec3, pixel: f32) -> Vec3 {
     const PITCH: Vec2 = Vec2::new(0.222, 0.077);
+    // Every second course is shifted by half a brick.
     let course = split(uv / PITCH).0.y;
     let shifted = Vec2::new(uv.x + 0.5 * PITCH.x * (course & 1) as f32, uv.y) / PITCH;
     let (cell, f) = split(shifted);
+    // Edges are not quite straight.
     let wobble = 0.002 * noise(uv / 0.03, 31) * visibility(0.03, pixel);
     let to_joint = (f.min(Vec2::ONE - f) * PITCH).min_element() - 0.006 + wobble;
     let share = edge(to_joint, 0.0, pixel);
@@ -117,6 +119,7 @@ fn bricks(uv: Vec2, brick: Vec3, mortar: Vec3, pixel: f32) -> Vec3 {
     if share == 0.0 {
         return joint;
     }
+    // No two bricks have the same colour.
     let tone = 0.62 + 0.6 * random(cell, 32);
     let grain = 1.0 + 0.32 * layered_noise(uv, 0.05, 4, pixel, 33);
     let tint = Vec3::new(1.0, 0.8 + 0.35 * random(cell, 34), 0.8 + 0.3 * random(cell, 35));

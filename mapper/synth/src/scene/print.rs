@@ -33,6 +33,7 @@ pub(super) fn poster(uv: Vec2, half: Vec2, pixel: f32, seed: u32) -> Vec3 {
 fn picture(uv: Vec2, half: Vec2, pixel: f32, seed: u32) -> Vec3 {
     let height = 0.5 + 0.5 * uv.y / half.y;
     let mut shade = ink(0, seed).lerp(ink(1, seed), height);
+    // Beams across a gradient of two inks.
     let tilt = 3.0 * number(1, seed) - 1.5;
     let across = (uv.x + tilt * uv.y) / (0.16 * half.x);
     let (beam, f) = split(Vec2::new(across, 0.0));
@@ -41,6 +42,7 @@ fn picture(uv: Vec2, half: Vec2, pixel: f32, seed: u32) -> Vec3 {
         shade = shade.lerp(ink(2, seed), 0.55 * share);
     }
     for disc in 0..6 {
+        // Six discs with a ring each.
         let place = Vec2::new(number(10 + disc, seed), number(20 + disc, seed)) * 1.7 - 0.85;
         let radius = (0.1 + 0.28 * number(30 + disc, seed)) * half.x;
         let distance = (uv - place * half).length();
@@ -60,6 +62,7 @@ pub(super) fn cardboard(uv: Vec2, axis: usize, half: f32, pixel: f32, seed: u32)
     if axis == 1 {
         return board;
     }
+    // A printed label in the upper left, a round stamp in the lower right.
     let label = Vec2::new(-0.42, 0.1) * half;
     let local = uv - label;
     let size = Vec2::new(0.4, 0.3) * half;

@@ -25,6 +25,7 @@ pub(super) fn build(motion: CameraMotion) -> Scene {
         things.extend(room_behind::furniture());
     }
     let lighting = Lighting {
+        // Light of the sky from above, of the floor from below; a lamp at the ceiling, a window, a floor lamp.
         from_above: Vec3::new(0.30, 0.31, 0.33),
         from_below: Vec3::new(0.17, 0.15, 0.13),
         lamps: Lamps::new(&[
@@ -63,6 +64,7 @@ fn pictures() -> Vec<Thing> {
         Thing::cuboid(x, y - half.y, z, [width, height, 0.03], degrees, look)
     };
     vec![
+        // Far wall, right, left and near wall, then the carpet.
         poster(0.75, 1.62, 2.985, 0.8, 1.05, 0.0, 3),
         poster(-0.35, 1.75, 2.985, 0.62, 0.62, 0.0, 14),
         poster(2.0, 1.65, 2.985, 0.66, 0.9, 0.0, 21),
@@ -90,6 +92,7 @@ fn standing() -> Vec<Thing> {
     let clay = Material::Rings { a: colour(0xa8573a), b: colour(0xc98a5e), width: 0.04 };
     let shade = Material::Wallpaper { base: colour(0xf0dcae), figure: colour(0xc98b4a) };
     let mut things = vec![
+        // A striped pipe near the camera, a lamp with its shade, a pot, and a beam across the room.
         Thing::column(-1.55, 0.0, 0.75, 0.1, 2.7, stripes),
         Thing::column(2.75, 0.0, 0.9, 0.02, 1.45, brass),
         Thing::column(2.75, 1.4, 0.9, 0.2, 0.32, shade),
@@ -104,6 +107,7 @@ fn standing() -> Vec<Thing> {
             Material::Wood { colour: colour(0x7a5536), plank: 0.09 },
         ),
     ];
+    // A plant: balls of leaves on the pot.
     let leaves = [
         (2.85, 0.62, 2.35, 0.26),
         (2.66, 0.85, 2.25, 0.18),

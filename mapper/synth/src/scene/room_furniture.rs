@@ -27,6 +27,7 @@ pub(super) fn desk() -> Vec<Thing> {
     let globe = Material::Marble { base: colour(0x4f86b0), vein: colour(0xd9c98a) };
     let mut things = table(0.75, 2.5, [1.9, 0.74, 0.8], oak);
     things.extend([
+        // Screen on its foot, two sheets, mug, globe, drawers.
         Thing::cuboid(0.8, 0.82, 2.62, [0.66, 0.42, 0.04], -8.0, dark),
         Thing::cuboid(0.797, 0.84, 2.598, [0.62, 0.38, 0.006], -8.0, screen),
         Thing::cuboid(0.8, 0.74, 2.64, [0.08, 0.1, 0.05], -8.0, dark),
@@ -38,6 +39,7 @@ pub(super) fn desk() -> Vec<Thing> {
         Thing::column(1.45, 0.74, 2.5, 0.08, 0.06, dark),
         Thing::cuboid(1.35, 0.02, 2.5, [0.45, 0.6, 0.6], 0.0, oak),
     ]);
+    // Three books, turned against each other.
     let cloth = [0x8c2f39, 0x35607a, 0xc7a03c];
     things.extend(cloth.into_iter().zip(0_u32..).map(|(cloth, level)| {
         let half = Vec2::new(0.13, 0.022);
@@ -55,6 +57,7 @@ pub(super) fn bookshelf() -> Vec<Thing> {
     let wood = Material::Wood { colour: colour(0x6f4a2f), plank: 0.14 };
     let side = |x: f32| Thing::cuboid(x, 0.0, Z, [0.03, 2.05, 0.32], 0.0, wood);
     let mut things = vec![
+        // Sides and back, then the boards with a row of books on each but the last.
         side(X - 0.5 * WIDTH),
         side(X + 0.5 * WIDTH),
         Thing::cuboid(X, 0.0, Z + 0.15, [WIDTH, 2.05, 0.02], 0.0, wood),
@@ -79,6 +82,7 @@ fn row_of_books(from: f32, to: f32, height: f32, z: f32, row: u32) -> Vec<Thing>
         if x + width > to {
             break;
         }
+        // Every eighth place is empty.
         if chance(index, 2) > 0.12 {
             let size = [width - 0.003, 0.22 + 0.11 * chance(index, 3), 0.17 + 0.08 * chance(index, 4)];
             let cloth = CLOTH[(9.0 * chance(index, 5)) as usize % CLOTH.len()];
@@ -102,6 +106,7 @@ pub(super) fn round_table() -> Vec<Thing> {
     let orange = Material::Plaster { colour: colour(0xe08a2c), stain: 0.22 };
     let apple = Material::Marble { base: colour(0xb23a34), vein: colour(0xd9b04c) };
     vec![
+        // Table, crate, newspaper, vase with a plant, fruit.
         Thing::column(0.35, 0.69, 0.45, 0.55, 0.03, top),
         Thing::column(0.35, 0.03, 0.45, 0.05, 0.66, leg),
         Thing::column(0.35, 0.0, 0.45, 0.25, 0.03, leg),

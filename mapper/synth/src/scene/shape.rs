@@ -175,6 +175,7 @@ fn hit_column(origin: Vec3, direction: Vec3, radius: f32, half_height: f32) -> f
     let flat = |v: Vec3| Vec2::new(v.x, v.z);
     let (o, d) = (flat(origin), flat(direction));
     let length2 = d.length_squared();
+    // Across the axis the column is a circle: nearest point of the ray, half of the chord.
     let middle = -o.dot(d) / length2;
     let rest = radius * radius - (o + d * middle).length_squared();
     if rest <= 0.0 {
@@ -184,6 +185,7 @@ fn hit_column(origin: Vec3, direction: Vec3, radius: f32, half_height: f32) -> f
     if side > 0.0 && (origin.y + direction.y * side).abs() <= half_height {
         return side;
     }
+    // From above or below the ray may come in through a cap.
     let cap = (half_height.copysign(origin.y) - origin.y) / direction.y;
     let on_cap = (o + d * cap).length_squared() <= radius * radius;
     if cap > 0.0 && origin.y.abs() > half_height && on_cap { cap } else { f32::INFINITY }
@@ -191,6 +193,7 @@ fn hit_column(origin: Vec3, direction: Vec3, radius: f32, half_height: f32) -> f
 
 fn column_surface(local: Vec3, radius: f32, half_height: f32) -> SurfacePoint {
     let across = Vec2::new(local.x, local.z).length();
+    // The nearer surface: a cap or the side.
     if half_height - local.y.abs() < radius - across {
         let normal = Vec3::Y * local.y.signum();
         return SurfacePoint { normal, uv: Vec2::new(local.x, local.z), axis: 1 };

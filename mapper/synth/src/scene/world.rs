@@ -108,6 +108,7 @@ impl Scene {
     pub(crate) fn radiance(&self, ray: &Ray, hit: &Hit, pixel_angle: f32) -> Vec3 {
         let point = ray.at(hit.distance);
         let length = ray.direction.length();
+        // The size of a pixel on the surface, which fades out patterns that are finer than it.
         let pixel_at = |normal: Vec3| {
             let cosine = (ray.direction.dot(normal) / length).abs().max(0.1);
             pixel_angle * hit.distance * length / cosine.sqrt()
@@ -124,8 +125,10 @@ impl Scene {
                 (normal, material.colour(uv, 2, pixel_at(normal)))
             }
         };
+        // Less light comes into corners of the room.
         let margin = (point - self.enclosure.low).min(self.enclosure.high - point);
         let light = self.lighting.irradiance(point, normal) * corner_darkening(margin, normal);
+        // Patterns may swing below black.
         albedo.max(Vec3::ZERO) * light
     }
 }

@@ -37,6 +37,7 @@ pub fn parse_mesh(path: &Path, bytes: &[u8]) -> Result<Mesh, PlyError> {
                 has_vertices = true;
             }
             "face" => read_faces(path, element, &mut records, &mut mesh)?,
+            // Other elements have to be walked over: records have no index.
             _ => records.read(element, &[], |_, _| Ok(()))?,
         }
     }
@@ -51,6 +52,7 @@ fn read_vertices(
 ) -> Result<(), PlyError> {
     let place = |name| element.number(name).ok_or_else(|| missing(path, "vertices", name));
     let position = [place("x")?, place("y")?, place("z")?];
+    // Colours are optional, but only whole ones.
     let colour = match ["red", "green", "blue"].map(|name| element.number(name)) {
         [Some(red), Some(green), Some(blue)] => Some([red, green, blue]),
         _ => None,

@@ -14,9 +14,10 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use mba_mapper::evaluation::{DEFAULT_MAX_DT, TrajectoryAlignment};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tracker::ReferenceMode;
+use nalgebra::UnitVector3;
 
-pub use values::{BlurMode, Switch};
-use values::{non_negative, positive, seconds, size, virtual_views};
+pub use values::{BlurMode, LengthBetween, Switch};
+use values::{direction, length_between, non_negative, positive, seconds, size, virtual_views};
 
 /// Most worker threads: several for every core of the largest machines.
 pub const MOST_THREADS: u16 = 1024;
@@ -126,7 +127,8 @@ beside it, into exposures.csv for a FILE of that name.
 
 Examples:
   mba calibrate data
-  mba calibrate data --focal-length --out found/calibration.toml")]
+  mba calibrate data --focal-length --out found/calibration.toml
+  mba calibrate data --distance 0:250=1.2 --out found/calibration.toml")]
 pub struct Calibrate {
     /// Folder of the data set
     #[arg(value_name = "DATASET")]
@@ -137,6 +139,10 @@ pub struct Calibrate {
     /// Look for the focal length, too, around the one on record
     #[arg(long)]
     pub focal_length: bool,
+    /// A length that was measured, which fixes the depth scale: the camera was this many metres further at frame TO than at
+    /// frame FROM, in a straight line; frames count from 0
+    #[arg(long, value_name = "FROM:TO=METRES", value_parser = length_between)]
+    pub distance: Option<LengthBetween>,
 }
 
 /// Arguments of `mba track`.
@@ -191,6 +197,10 @@ pub struct Tracking {
     /// Find exposure and readout times that are not on record from the recording first, or assume the usual
     #[arg(long, value_enum, default_value_t)]
     pub self_calibrate: Switch,
+    /// Where up is in the first camera's axes (x right, y down, z ahead): -y for one that was held upright. The world then
+    /// has z up; default: by an accelerometer, else the world is the first camera's
+    #[arg(long, value_name = "AXIS", value_parser = direction, allow_hyphen_values = true)]
+    pub up: Option<UnitVector3<f64>>,
 }
 
 /// Values of `--reference`.

@@ -6,9 +6,10 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use mba_mapper::slam::{Arrival, SlamReference, SlamSettings};
+use nalgebra::UnitVector3;
 
 use super::map::Field;
-use super::values::{BlurMode, Switch, positive_seconds, seconds, virtual_views};
+use super::values::{BlurMode, Switch, direction, positive_seconds, seconds, virtual_views};
 
 /// Arguments of `mba slam`.
 #[derive(Debug, Args)]
@@ -42,18 +43,37 @@ pub struct Slam {
 /// Arguments of `mba ablate`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Runs `mba slam` with defaults, then once more with each part left out or replaced, and prints a table. DIR gets \
-one RUN folder per row; rows whose folder is complete are not run again.
+Runs `mba slam` or `mba track` with defaults, then once more with each part left out or replaced, and prints a table. DIR \
+gets one RUN folder per run; runs whose folder is complete are not run again. Without ground truth the tracker's table still \
+says how many motions within exposures cannot be.
 
-Example:
-  mba ablate data --out ablation")]
+Examples:
+  mba ablate data --out ablation
+  mba ablate data --out parts --of track --repeats 5")]
 pub struct Ablate {
-    /// Folder of the data set, with ground truth
+    /// Folder of the data set, best with ground truth
     #[arg(value_name = "DATASET")]
     pub dataset: PathBuf,
     /// Folder for the runs
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+    /// What is run: all of slam, or the tracker alone, which takes seconds
+    #[arg(long, value_enum, default_value_t)]
+    pub of: Ablated,
+    /// Runs of each row, with focal lengths that differ by a ten-thousandth: what a figure varies by itself is no worth of any
+    /// part. The table has the middle of the runs, the least and the most
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=99))]
+    pub repeats: u16,
+}
+
+/// Values of `ablate --of`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Ablated {
+    /// Tracking and mapping at the same time
+    #[default]
+    Slam,
+    /// The tracker alone: blur model, rows, depth term, deblurred keyframes, IMU
+    Track,
 }
 
 /// How SLAM is done.
@@ -84,6 +104,10 @@ pub struct Slamming {
     /// Find exposure and readout times that are not on record from the recording first, or assume the usual
     #[arg(long, value_enum, default_value_t)]
     pub self_calibrate: Switch,
+    /// Where up is in the first camera's axes (x right, y down, z ahead): -y for one that was held upright. The world then
+    /// has z up; default: by an accelerometer, else the world is the first camera's
+    #[arg(long, value_name = "AXIS", value_parser = direction, allow_hyphen_values = true)]
+    pub up: Option<UnitVector3<f64>>,
     /// What can be left out.
     #[command(flatten)]
     pub ablation: Ablation,
@@ -147,6 +171,7 @@ impl From<&Slamming> for SlamSettings {
             checkpoint_interval: args.checkpoint_interval,
             arrival: if args.realtime { Arrival::RealTime } else { Arrival::LockStep },
             seed: args.seed,
+            up: args.up,
         }
     }
 }
@@ -162,6 +187,7 @@ impl Default for Slamming {
             checkpoint_interval: SlamSettings::default().checkpoint_interval,
             seed: SlamSettings::default().seed,
             self_calibrate: Switch::default(),
+            up: None,
             ablation: Ablation::default(),
         }
     }

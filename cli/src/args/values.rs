@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use clap::ValueEnum;
 use mba_tracker::transfer::MAX_VIRTUAL_VIEWS;
+use nalgebra::{UnitVector3, Vector3};
 
 /// Values of `--blur`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
@@ -47,6 +48,40 @@ pub(super) fn virtual_views(text: &str) -> Result<usize, String> {
         Ok(views) if (1..=MAX_VIRTUAL_VIEWS).contains(&views) => Ok(views),
         _ => Err(format!("a number from 1 to {MAX_VIRTUAL_VIEWS} is needed")),
     }
+}
+
+/// A direction along an axis.
+pub(super) fn direction(text: &str) -> Result<UnitVector3<f64>, String> {
+    let (axis, sign) = text.strip_prefix('-').map_or((text, 1.0), |axis| (axis, -1.0));
+    let axis = match axis.strip_prefix('+').unwrap_or(axis) {
+        "x" => Vector3::x(),
+        "y" => Vector3::y(),
+        "z" => Vector3::z(),
+        _ => return Err("one of x, -x, y, -y, z, -z is needed".to_owned()),
+    };
+    Ok(UnitVector3::new_unchecked(axis * sign))
+}
+
+/// Value of `--distance`: a length between the places of the camera at two frames.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LengthBetween {
+    /// Index of the first frame.
+    pub from: usize,
+    /// Index of the second.
+    pub to: usize,
+    /// Length, above zero.
+    pub metres: f64,
+}
+
+/// Two frames and a length.
+pub(super) fn length_between(text: &str) -> Result<LengthBetween, String> {
+    let parse = || {
+        let (frames, metres) = text.split_once('=')?;
+        let (from, to) = frames.split_once(':')?;
+        let (from, to) = (from.parse().ok()?, to.parse().ok()?);
+        Some(LengthBetween { from, to, metres: positive(metres).ok()? })
+    };
+    parse().ok_or_else(|| "two frames and a length in metres such as 0:250=1.2 are needed".to_owned())
 }
 
 /// Two numbers with an x between them.

@@ -10,9 +10,9 @@ use mba_mapper::self_calibration::{self, Finding};
 use serde::Serialize;
 
 use super::open;
-use crate::args::{Calibrate, Switch};
+use crate::args::{Calibrate, LengthBetween, Switch};
 use crate::console::Console;
-use crate::failure::OrBadInput;
+use crate::failure::{OrBadInput, bad_input};
 use crate::written_run::note_written;
 
 /// What the command prints.
@@ -41,7 +41,12 @@ pub fn run(args: &Calibrate, console: &Console) -> anyhow::Result<()> {
             dataset = dataset.with_calibration(calibration)?;
         }
     }
-    if let Some((finding, found)) = self_calibration::depth_scale(&dataset) {
+    // A measured length is surer than an accelerometer.
+    let scale = match &args.distance {
+        Some(length) => Some(measured(&dataset, length)?),
+        None => self_calibration::depth_scale(&dataset),
+    };
+    if let Some((finding, found)) = scale {
         findings.push(finding);
         if let Some(depth_scale) = found {
             let mut calibration = dataset.calibration().clone();
@@ -63,6 +68,17 @@ pub fn run(args: &Calibrate, console: &Console) -> anyhow::Result<()> {
     }
     let result = Result { findings, sources: dataset.calibration().sources };
     console.result(&result, table)
+}
+
+/// The depth scale by a length that was measured.
+fn measured(dataset: &Dataset, length: &LengthBetween) -> anyhow::Result<(Finding, Option<f64>)> {
+    let LengthBetween { from, to, metres } = *length;
+    if from.max(to) >= dataset.len() {
+        let message = format!("--distance names frame {}, but there are {}", from.max(to), dataset.len());
+        return Err(bad_input(message, "frames count from 0, in the order of time"));
+    }
+    let found = self_calibration::depth_scale_by_distance(dataset, [from, to], metres);
+    found.or_bad_input("name two frames that are tracked and some decimetres apart")
 }
 
 fn refocused(calibration: &Calibration, factor: f64) -> Calibration {
@@ -93,20 +109,31 @@ fn table(result: &Result) -> String {
     result.findings.iter().map(|finding| format!("{finding}\n")).collect()
 }
 
-/// The data set with exposure and readout times that are not on record, found from the recording itself unless that is
-/// switched off; says what was found.
+/// The data set with exposure and readout times that are not on record, found from the recording itself, and without an
+/// IMU that contradicts it, unless that is switched off; says what was found.
 ///
 /// # Errors
 /// As [`self_calibration::complete`].
 pub fn completed(dataset: Dataset, switch: Switch, console: &Console) -> anyhow::Result<Dataset> {
-    if switch == Switch::Off || self_calibration::is_complete(&dataset) {
+    if switch == Switch::Off {
         return Ok(dataset);
+    }
+    if self_calibration::is_complete(&dataset) {
+        return Ok(without_faults(dataset));
     }
     console.note("looking for what is not on record about the camera, which takes some seconds");
     let (dataset, findings) = self_calibration::complete(dataset)?;
     let found: Vec<String> = findings.iter().map(ToString::to_string).collect();
     console.note(format!("found from the recording: {}", found.join("; ")));
-    Ok(dataset)
+    Ok(without_faults(dataset))
+}
+
+/// The data set without an IMU whose gyroscope does not turn as the camera does.
+fn without_faults(dataset: Dataset) -> Dataset {
+    match self_calibration::gyroscope_fault(&dataset) {
+        Some(fault) => dataset.without_imu(fault.to_string()),
+        None => dataset,
+    }
 }
 
 /// Keeps in the RUN folder `out` what was found about the camera, in place of what an earlier run found.

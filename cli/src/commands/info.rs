@@ -4,7 +4,7 @@ use std::path::Path;
 
 use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::evaluation::associate;
-use mba_mapper::self_calibration::depth_lag;
+use mba_mapper::self_calibration::{depth_lag, quick_contradictions};
 use serde::Serialize;
 
 use super::camera_facts::CameraFacts;
@@ -118,6 +118,7 @@ fn warnings(dataset: &Dataset, camera: &CameraFacts, survey: Survey) -> Vec<Stri
         warnings.push(format!("the median depth is {median} m: is depth_scale in raw units per metre?"));
     }
     warnings.extend(depth_lag(dataset).map(|lag| lag.to_string()));
+    warnings.extend(quick_contradictions(dataset).iter().map(ToString::to_string));
     if survey.black > 0 {
         warnings.push(format!("{} of {} sampled colour images are black", survey.black, survey.sampled));
     } else if survey.plain > 0 {

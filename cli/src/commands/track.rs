@@ -5,11 +5,14 @@ use std::path::Path;
 use std::time::Duration;
 
 use mba_mapper::dataset::Dataset;
-use mba_mapper::run::{Merit, RunError, RunSettings, RunWriter, Summary, write_deblurred_keyframes};
-use mba_mapper::self_calibration::depth_lag_of_tracked;
-use mba_mapper::tracking::{
-    TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config,
+use mba_mapper::run::{
+    Merit, RunError, RunSettings, RunWriter, Summary, plausibility, write_deblurred_keyframes,
 };
+use mba_mapper::self_calibration::{contradictions, depth_lag_of_tracked};
+use mba_mapper::tracking::{
+    TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config, upright_world,
+};
+use nalgebra::UnitVector3;
 use serde_json::json;
 
 use super::{calibrate, open, outcome};
@@ -83,6 +86,11 @@ pub fn track_into(
             }
         }
     }
+    for found in contradictions(dataset, writer.exposures(), writer.frames()) {
+        console.warning(found.to_string());
+        writer.warn(found.to_string());
+    }
+    stand_upright(dataset, args.up, &mut writer);
     if outcome::nothing_tracked(writer.frames()) && writer.has_earlier() {
         writer.give_up();
         return Err(outcome::failure(dataset, "; the earlier run in the folder stays"));
@@ -93,7 +101,9 @@ pub fn track_into(
         return Err(stopped(dataset, out, &writer, resumption));
     }
     let merit = Merit::of(writer.exposures(), dataset);
+    let plausibility = plausibility(writer.exposures(), writer.frames(), dataset);
     let summary = writer.finish(|summary| {
+        summary.plausibility = plausibility;
         summary.trajectory = merit.trajectory;
         summary.blur = merit.blur;
     })?;
@@ -105,6 +115,16 @@ pub fn track_into(
     note_written(out, console);
     outcome::check(&summary, dataset, console)?;
     Ok(summary)
+}
+
+/// Moves the run into a world whose z axis points up, if it is known where that is.
+fn stand_upright(dataset: &Dataset, up_in_first_camera: Option<UnitVector3<f64>>, writer: &mut RunWriter) {
+    let (exposures, records) = (writer.exposures(), writer.frames());
+    let upright = upright_world(dataset, exposures, records, up_in_first_camera);
+    if let Some((upright_from_world, how)) = upright {
+        writer.move_world(|_| upright_from_world);
+        writer.set_upright(how);
+    }
 }
 
 fn deblur_keyframes(

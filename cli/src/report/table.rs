@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use mba_mapper::evaluation::{BlurFigures, TrajectoryFigures};
-use mba_mapper::run::{MapFigures, SlamFigures, Spread, Summary};
+use mba_mapper::evaluation::{BlurFigures, MotionPlausibility, TrajectoryFigures};
+use mba_mapper::run::{MapFigures, SlamFigures, Spread, Summary, UpSource, Upright};
 use mba_mapper::statistics::Statistics;
 
 /// The table of a trajectory evaluation, lengths in metres, angles in degrees.
@@ -35,6 +35,23 @@ pub fn trajectory(figures: &TrajectoryFigures) -> String {
     text + &pairs(&rows) + &scale_row(figures.scale)
 }
 
+/// How many motions within exposures cannot be, or are unlikely.
+#[must_use]
+pub fn plausible(found: &MotionPlausibility) -> String {
+    let MotionPlausibility { judged, impossible, pairs, reversing } = found;
+    format!("{impossible} of {judged} impossible, {reversing} of {pairs} blurred neighbours reversed")
+}
+
+/// What is known of the world's z axis.
+#[must_use]
+pub fn upright(how: &Upright) -> String {
+    let sigma = how.sigma_degrees.map_or_else(String::new, |sigma| format!(" +- {sigma:.1} degrees"));
+    match how.source {
+        UpSource::Accelerometer => format!("z is up{sigma}, by the accelerometer"),
+        UpSource::Given => "z is up, as given".to_owned(),
+    }
+}
+
 /// The table of a run: counts, times and, with ground truth, figures of merit.
 #[must_use]
 pub fn summary(summary: &Summary) -> String {
@@ -49,6 +66,8 @@ pub fn summary(summary: &Summary) -> String {
     };
     rows.extend(summary.milliseconds.iter().map(|s| ("time per frame", spread(s, "ms"))));
     rows.extend(summary.blur_px.iter().map(|s| ("estimated blur", spread(s, "px"))));
+    rows.extend(summary.plausibility.iter().map(|found| ("exposure motions", plausible(found))));
+    rows.extend(summary.upright.iter().map(|how| ("world", upright(how))));
     let mut text = pairs(&rows);
     let parts = [
         summary.trajectory.as_ref().map(trajectory),

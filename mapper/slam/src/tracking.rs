@@ -1,6 +1,7 @@
 //! Tracking a whole data set into a RUN folder.
 
 mod saved;
+mod upright;
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -20,6 +21,7 @@ use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
 use crate::uncertainty::Uncertainty;
 use mba_io::checkpoint::CheckpointError;
 pub use saved::TrackingCheckpoint;
+pub use upright::upright_world;
 
 /// What can be chosen about the tracker; everything else follows from the data set.
 #[derive(Clone, Copy, Debug, PartialEq)]

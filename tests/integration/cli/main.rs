@@ -16,6 +16,7 @@ mod mesh;
 mod outputs;
 mod real_camera;
 mod render;
+mod sensors;
 mod slam;
 
 use std::ffi::OsStr;

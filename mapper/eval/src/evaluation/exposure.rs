@@ -79,7 +79,7 @@ fn compare_motions(
 }
 
 /// Scalar product of two motions in square metres; a rotation counts as the path it moves a point at `depth`.
-fn motion_product(a: &ExposureTrajectory, b: &ExposureTrajectory, depth: f64) -> f64 {
+pub(super) fn motion_product(a: &ExposureTrajectory, b: &ExposureTrajectory, depth: f64) -> f64 {
     let translation = |e: &ExposureTrajectory| {
         e.mid().rotation.inverse_transform_vector(&(e.end.translation - e.start.translation))
     };

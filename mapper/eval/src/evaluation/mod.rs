@@ -11,6 +11,7 @@ mod icp;
 mod image;
 mod kd_tree;
 mod mesh_depth;
+mod plausibility;
 mod pose_alignment;
 mod surface;
 mod trajectory;
@@ -23,6 +24,7 @@ pub use icp::refine_by_icp;
 pub use image::{DepthDifference, ImageError, depth_difference, psnr, ssim};
 pub use kd_tree::KdTree;
 pub use mesh_depth::{MeshDepthError, MeshDepthFigures, evaluate_mesh_depth};
+pub use plausibility::{MotionPlausibility, motion_plausibility};
 pub use pose_alignment::{PoseAlignment, PoseAlignmentError, align_poses};
 pub use surface::{MeanMedian, SurfaceComparisonError, SurfaceFigures, ThresholdFigures, evaluate_surface};
 pub use trajectory::{

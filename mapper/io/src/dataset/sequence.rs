@@ -292,6 +292,14 @@ impl Dataset {
         self.imu.as_ref()
     }
 
+    /// The data set without its IMU, with a warning that says why.
+    #[must_use]
+    pub fn without_imu(mut self, problem: String) -> Self {
+        self.imu = None;
+        self.warnings.push(Warning::ImuUnusable { problem });
+        self
+    }
+
     /// The share of light that the lens lets through to each pixel of the frames, row by row, from 0 to about 1;
     /// none for a lens without fall-off. Undistortion is taken into account: the fall-off is that of the stored image.
     #[must_use]

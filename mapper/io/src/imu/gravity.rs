@@ -71,6 +71,7 @@ pub fn inertial_fit(imu: &ImuRecording, poses: &[(f64, RigidTransform)]) -> Opti
     (solution[0], solution[GRAVITY_AT + 1]) = (1.0, -GRAVITY);
     let mut weights = vec![1.0; poses.len()];
     let mut covariance = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::zeros();
+    let mut attenuation = 0.0;
     for round in 0..ROUNDS {
         let (mut normal, mut right) = prior(&solution, round > 0);
         for (k, weight) in weights.iter().enumerate() {
@@ -80,6 +81,10 @@ pub fn inertial_fit(imu: &ImuRecording, poses: &[(f64, RigidTransform)]) -> Opti
         }
         covariance = normal.try_inverse()?;
         solution = covariance * right;
+        let residual = residual_power(&integrals, &positions, &solution, &weights);
+        // What the positions explain besides everything else.
+        let explained = solution[0] * solution[0] / covariance[(0, 0)];
+        attenuation = residual / (residual + explained);
         weights = reweighted(&integrals, &positions, &solution);
     }
     let gravity = Vector3::from(solution.fixed_rows::<3>(GRAVITY_AT));
@@ -87,7 +92,9 @@ pub fn inertial_fit(imu: &ImuRecording, poses: &[(f64, RigidTransform)]) -> Opti
     let across = covariance.fixed_view::<3, 3>(GRAVITY_AT, GRAVITY_AT).trace();
     let fit = InertialFit {
         metre: solution[0],
-        metre_sigma: covariance[(0, 0)].sqrt(),
+        // Errors of the positions make the metre too short by this share, those of the force do not; which they are, nobody
+        // knows.
+        metre_sigma: covariance[(0, 0)].sqrt().hypot(attenuation),
         up,
         up_sigma: across.sqrt() / GRAVITY,
     };
@@ -111,6 +118,17 @@ fn prior(
         right += row * (GRAVITY / GRAVITY_SIGMA);
     }
     (normal, right)
+}
+
+/// Sum of the weighted squares of what is missed.
+fn residual_power(
+    integrals: &Integrals,
+    positions: &[Vector3<f64>],
+    solution: &SVector<f64, UNKNOWNS>,
+    weights: &[f64],
+) -> f64 {
+    let missed = |k: usize| (integrals.rows(k, &positions[k]) * solution - integrals.force[k]).norm_squared();
+    weights.iter().enumerate().map(|(k, weight)| weight * missed(k)).sum()
 }
 
 /// Weight of each pose: that of its usual residual, less for those that lie farther off.
@@ -274,6 +292,24 @@ mod tests {
             assert!((fit.metre / metre - 1.0).abs() < 0.004, "{fit:?} of {metre}");
             assert!((fit.metre / metre - 1.0).abs() < 3.0 * fit.metre_sigma, "{fit:?} of {metre}");
             assert!(fit.up.angle(&Vector3::y_axis()) < 0.01, "{fit:?}");
+        }
+    }
+
+    #[test]
+    fn a_sensor_that_felt_another_motion_measures_no_metre() {
+        let mut imu = recording(Vector3::zeros());
+        let elsewhere = recording(Vector3::zeros());
+        // The forces of the path played backwards.
+        let last = elsewhere.specific_forces().len() - 1;
+        let forces = (0..=last)
+            .map(|k| TimedVector {
+                time: elsewhere.specific_forces()[k].time,
+                value: elsewhere.specific_forces()[last - k].value,
+            })
+            .collect();
+        imu = ImuRecording::new(imu.angular_velocities().to_vec(), forces);
+        if let Some(fit) = inertial_fit(&imu, &poses(1.0)) {
+            assert!(fit.metre_sigma > 0.3, "{fit:?}");
         }
     }
 

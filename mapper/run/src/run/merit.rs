@@ -1,11 +1,14 @@
-//! Figures of merit of a run whose data set has ground truth.
+//! Figures of merit of a run: against the ground truth of its data set, and without it.
 
 use mba_io::dataset::{Dataset, survey};
 use mba_io::trajectory_file::{TimedExposure, TimedPose};
 
 use mba_eval::evaluation::{
-    BlurFigures, DEFAULT_MAX_DT, TrajectoryFigures, TrajectoryOptions, evaluate_blur, evaluate_trajectory,
+    BlurFigures, DEFAULT_MAX_DT, MotionPlausibility, TrajectoryFigures, TrajectoryOptions, evaluate_blur,
+    evaluate_trajectory, motion_plausibility,
 };
+
+use super::{FrameRecord, FrameStatus};
 
 /// Frames from which the median depth of a data set is taken.
 const SAMPLED_FRAMES: usize = 16;
@@ -34,6 +37,18 @@ pub fn trajectory_figures(exposures: &[TimedExposure], dataset: &Dataset) -> Opt
     let poses: Vec<TimedPose> = exposures.iter().map(mid_pose).collect();
     let evaluation = evaluate_trajectory(dataset.ground_truth(), &poses, &TrajectoryOptions::default());
     evaluation.ok().map(|evaluation| TrajectoryFigures::from(&evaluation))
+}
+
+/// Whether the motions within exposures are possible; none without any depth, at which they would be seen.
+#[must_use]
+pub fn plausibility(
+    exposures: &[TimedExposure],
+    records: &[FrameRecord],
+    dataset: &Dataset,
+) -> Option<MotionPlausibility> {
+    let depth = survey(dataset, SAMPLED_FRAMES).median_depth?;
+    let is_found = |k: usize| records.get(k).is_some_and(|record| record.status != FrameStatus::Lost);
+    Some(motion_plausibility(exposures, is_found, &dataset.calibration().camera, depth))
 }
 
 /// The pose at mid exposure.

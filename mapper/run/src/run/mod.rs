@@ -23,17 +23,19 @@ mod reader;
 mod rows;
 mod stored_path;
 mod summary;
+mod upright;
 mod writer;
 
 pub use camera::{RunCamera, RunResponse};
 pub use deblurred_keyframes::write_deblurred_keyframes;
 pub use error::RunError;
 pub use frame_record::{FrameRecord, Reason};
-pub use merit::{Merit, mid_pose, trajectory_figures};
+pub use merit::{Merit, mid_pose, plausibility, trajectory_figures};
 pub use reader::Run;
 pub use rows::RunRows;
 pub use stored_path::{path_of, stored_path};
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
+pub use upright::{UpSource, Upright};
 pub use writer::RunWriter;
 
 /// How far the pose of a frame can be trusted, as the tracker says it.

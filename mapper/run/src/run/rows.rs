@@ -4,7 +4,7 @@ use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::trajectory_file::TimedExposure;
 use serde::{Deserialize, Serialize};
 
-use super::{FrameRecord, RunError, RunWriter};
+use super::{FrameRecord, RunError, RunWriter, Upright};
 
 /// Everything that a [`RunWriter`] was told.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -13,6 +13,7 @@ pub struct RunRows {
     exposures: Vec<(f64, [PoseNumbers; 3])>,
     frames: Vec<FrameRecord>,
     skipped: usize,
+    upright: Option<Upright>,
     warnings: Vec<String>,
 }
 
@@ -48,6 +49,7 @@ impl RunWriter {
             exposures: self.exposures.iter().map(row).collect(),
             frames: self.frames.clone(),
             skipped: self.skipped,
+            upright: self.upright,
             warnings: self.warnings.clone(),
         }
     }
@@ -73,6 +75,7 @@ impl RunWriter {
         self.exposures = rows.exposures.into_iter().map(exposure).collect();
         self.frames = rows.frames;
         self.skipped = rows.skipped;
+        self.upright = rows.upright;
         self.warnings = rows.warnings;
         self.flush()
     }

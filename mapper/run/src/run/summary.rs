@@ -1,10 +1,10 @@
 //! `summary.json`.
 
-use mba_eval::evaluation::{BlurFigures, TrajectoryFigures};
+use mba_eval::evaluation::{BlurFigures, MotionPlausibility, TrajectoryFigures};
 use mba_io::statistics::quantile;
 use serde::{Deserialize, Serialize};
 
-use super::{FrameRecord, FrameStatus, RunCamera};
+use super::{FrameRecord, FrameStatus, RunCamera, Upright};
 
 /// Version of the summary's layout.
 const FORMAT: u32 = 1;
@@ -48,12 +48,18 @@ pub struct Summary {
     pub trajectory: Option<TrajectoryFigures>,
     /// Figures of merit of the exposures, when the data set has ground truth for them.
     pub blur: Option<BlurFigures>,
+    /// Whether the motions within exposures are possible, which needs no ground truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plausibility: Option<MotionPlausibility>,
     /// What is known of the map, when the run made one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub map: Option<MapFigures>,
     /// What is known of tracking and mapping at the same time, when the run did that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slam: Option<SlamFigures>,
+    /// Present where the z axis of the world points up; the world is that of the first camera otherwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub upright: Option<Upright>,
     /// Oddities of the input, one sentence each.
     pub warnings: Vec<String>,
 }
@@ -205,8 +211,10 @@ impl Summary {
             // Figures of merit come with the end of the run.
             trajectory: None,
             blur: None,
+            plausibility: None,
             map: None,
             slam: None,
+            upright: None,
             warnings: Vec::new(),
         }
     }

@@ -16,7 +16,7 @@ use super::earlier_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{
     CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, FrameStatus, RunError, RunSettings,
-    SUMMARY_FILE, Summary, TRAJECTORY_FILE, frame_record,
+    SUMMARY_FILE, Summary, TRAJECTORY_FILE, Upright, frame_record,
 };
 
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
@@ -39,6 +39,7 @@ pub struct RunWriter {
     pub(super) frames: Vec<FrameRecord>,
     pub(super) skipped: usize,
     deblurred: usize,
+    pub(super) upright: Option<Upright>,
     pub(super) warnings: Vec<String>,
     unwritten: usize,
 }
@@ -58,6 +59,7 @@ impl RunWriter {
             frames: Vec::new(),
             skipped: 0,
             deblurred: 0,
+            upright: None,
             warnings: Vec::new(),
             unwritten: 0,
         };
@@ -142,6 +144,11 @@ impl RunWriter {
             *exposure = exposure.seen_from(&new_world_from_world(index));
         }
         self.unwritten += self.exposures.len();
+    }
+
+    /// Notes that the z axis of the world that the exposures are in points up.
+    pub fn set_upright(&mut self, upright: Upright) {
+        self.upright = Some(upright);
     }
 
     /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map.
@@ -286,7 +293,12 @@ impl RunWriter {
 
     fn summary(&self) -> Summary {
         let summary = Summary::of(&self.settings, &self.frames, self.skipped);
-        Summary { warnings: self.warnings.clone(), deblurred_keyframes: self.deblurred, ..summary }
+        Summary {
+            warnings: self.warnings.clone(),
+            deblurred_keyframes: self.deblurred,
+            upright: self.upright,
+            ..summary
+        }
     }
 
     fn write(&self, summary: &Summary) -> Result<(), RunError> {

@@ -13,7 +13,8 @@ use serde::{Deserialize, Serialize};
 use super::other_frames::{Fit, all_exposures};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, output, picture_figures};
-use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary};
+use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary, plausibility};
+use crate::self_calibration::contradictions;
 
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.
 pub(super) const BUDGET_RESERVE: f64 = 0.1;
@@ -101,6 +102,8 @@ pub fn map_dataset(
     }
     // Not before it is known that there will be a map: this replaces an earlier one.
     let mut writer = RunWriter::create(out, describe)?;
+    // The map is made in the world of the run.
+    run.summary.upright.into_iter().for_each(|upright| writer.set_upright(upright));
     output::push_tracked(&mut writer, &frames)?;
     let earlier = running.seconds;
     let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
@@ -139,6 +142,9 @@ impl Conclusion<'_> {
         let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
         let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
         repairs.into_iter().for_each(|repair| writer.warn(repair));
+        let records = writer.frames();
+        let contradictions = contradictions(dataset, &exposures, records);
+        contradictions.into_iter().for_each(|found| writer.warn(found.to_string()));
         output::write(&mut writer, dataset, &mut bundle, &exposures, &refined)?;
         // Figures need the files, and close the summary.
         let figures = MapFigures {
@@ -153,7 +159,9 @@ impl Conclusion<'_> {
         };
         // Against the truth, where it is on record.
         let merit = Merit::of(&exposures, dataset);
+        let plausibility = plausibility(&exposures, writer.frames(), dataset);
         let summary = writer.finish(|summary| {
+            summary.plausibility = plausibility;
             summary.trajectory = merit.trajectory;
             summary.blur = merit.blur;
             summary.map = Some(figures);

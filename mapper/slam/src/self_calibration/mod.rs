@@ -12,6 +12,7 @@
 
 mod brightness;
 mod complete;
+mod contradiction;
 mod depth_edges;
 mod depth_lag;
 mod depth_time;
@@ -31,10 +32,13 @@ mod vignetting;
 mod window;
 
 pub use complete::{complete, is_complete};
+pub use contradiction::{
+    Contradiction, GyroscopeFault, contradictions, gyroscope_fault, quick_contradictions,
+};
 pub use depth_lag::{DepthLag, depth_lag, depth_lag_of_tracked};
 pub use finding::{Finding, Value};
 pub use focal::focal_length;
-pub use metre::depth_scale;
+pub use metre::{DistanceError, depth_scale, depth_scale_by_distance};
 pub use stored::{
     ESTIMATED_EXPOSURES_FILE, ESTIMATED_FILE, StoredError, has_estimates, read_back, remove, write,
 };

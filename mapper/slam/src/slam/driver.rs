@@ -8,6 +8,7 @@ use mba_adjust::bundle::{BundleAdjustment, BundleState, MapModel};
 use mba_io::checkpoint::load;
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;
+use mba_map::map::MapKind;
 use mba_tracker::{SimdLevel, TrackerConfig};
 
 use super::back_end::{BackEnd, keyframe_images, keyframes};
@@ -21,7 +22,7 @@ use super::{SlamError, front_end};
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
 use crate::run::{CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
 use crate::self_calibration::depth_lag_of_tracked;
-use crate::tracking::{TrackingError, tracker_config};
+use crate::tracking::{TrackingError, tracker_config, upright_world};
 
 /// Tracks and maps `dataset` at the same time into the RUN folder `out`. With `resume`, a run in lock step goes on from the
 /// checkpoint in `out` if there is one. `describe` becomes the settings of the run; `observe` is called after every frame
@@ -115,10 +116,11 @@ impl SlamRun<'_> {
         let live_seconds = earlier + started.elapsed().as_secs_f64();
         // The whole map is known only now.
         back_end.find_lost(dataset);
-        let (grown, mut writer, figures, keeper) = back_end.finish();
+        let (mut grown, mut writer, figures, keeper) = back_end.finish();
         if let Some(lag) = depth_lag_of_tracked(dataset, disagreement) {
             writer.warn(lag.to_string());
         }
+        self.stand_upright(&mut grown.bundle, &mut writer);
         if grown.bundle.state.map.is_empty() {
             return Err(MapError::NoDepth.into());
         }
@@ -128,6 +130,22 @@ impl SlamRun<'_> {
             ..figures
         };
         Ok(Refinement { bundle: grown.bundle, writer, keeper, figures, stopped: None, started, earlier })
+    }
+
+    /// Moves map and run into a world that stands upright, if it is known which way is up. A field cannot be turned.
+    fn stand_upright(&self, bundle: &mut BundleAdjustment, writer: &mut RunWriter) {
+        let (exposures, records) = (writer.exposures(), writer.frames());
+        let upright = upright_world(self.dataset, exposures, records, self.settings.up);
+        let Some((upright_from_world, how)) = upright.filter(|_| self.settings.kind == MapKind::Gaussians)
+        else {
+            return;
+        };
+        let frames = &bundle.state.frames;
+        let poses: Vec<_> =
+            frames.iter().map(|frame| upright_from_world.compose(&frame.path.mid())).collect();
+        bundle.move_keyframes(&poses);
+        writer.move_world(|_| upright_from_world);
+        writer.set_upright(how);
     }
 
     /// The refinement that a run was stopped in.

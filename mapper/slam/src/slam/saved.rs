@@ -19,7 +19,7 @@ use crate::mapping::{Running, dataset_fingerprint};
 use crate::run::RunRows;
 
 /// Layout of the content.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Time until the first checkpoint: a run that is stopped sooner has nothing worth keeping.
 const FIRST_AFTER: Duration = Duration::from_secs(1);

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use mba_map::map::MapKind;
 use mba_tracker::ReferenceMode;
+use nalgebra::UnitVector3;
 
 use crate::mapping::MapSettings;
 use crate::tracking::TrackingOptions;
@@ -61,6 +62,8 @@ pub struct SlamSettings {
     pub checkpoint_interval: Duration,
     /// Seed of the choice of keyframes to visit.
     pub seed: u64,
+    /// Where up is in the axes of the first camera; `None` for what an accelerometer says, if there is one.
+    pub up: Option<UnitVector3<f64>>,
 }
 
 impl Default for SlamSettings {
@@ -79,6 +82,7 @@ impl Default for SlamSettings {
             arrival: Arrival::default(),
             checkpoint_interval: MapSettings::default().checkpoint_interval,
             seed: 1,
+            up: None,
         }
     }
 }

@@ -99,7 +99,7 @@ pub(crate) fn sensor(sequence: &SynthSequence) -> Sensor {
 }
 
 fn keyframe(sensor: &Sensor, index: usize, frame: SynthFrame) -> Option<MapKeyframe> {
-    let prior = PathPrior { middle: frame.world_from_camera, motion: None };
+    let prior = PathPrior { middle: frame.world_from_camera, is_measured: true, motion: None };
     let observation = ObservationPyramid::new(sensor, &frame.into_captured(index), 2)?;
     Some(MapKeyframe::new(index, observation, prior))
 }

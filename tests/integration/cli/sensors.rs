@@ -10,9 +10,9 @@ use serde_json::Value;
 
 use super::{Workplace, mba};
 
-/// Renders a shaken recording with an IMU into `data`.
+/// Renders a shaken recording with an IMU into `shaken`.
 fn shaken(place: &Workplace) {
-    let out = place.path("data");
+    let out = place.path("shaken");
     let size = ["--frames", "40", "--size", "160x120", "--blur", "4", "--imu", "-q"];
     let fixed = ["synth", "--out"].map(OsStr::new).into_iter().chain([out.as_os_str()]);
     let outcome = mba(fixed.chain(size.iter().map(OsStr::new)));
@@ -20,7 +20,7 @@ fn shaken(place: &Workplace) {
 }
 
 fn run(place: &Workplace, command: &str, name: &str, options: &[&str]) -> Value {
-    let (data, out) = (place.path("data"), place.path(name));
+    let (data, out) = (place.path("shaken"), place.path(name));
     let fixed = [OsStr::new(command), data.as_os_str(), OsStr::new("--out"), out.as_os_str()];
     mba(fixed.into_iter().chain(options.iter().map(OsStr::new)).chain([OsStr::new("--json")])).json()
 }
@@ -32,7 +32,7 @@ fn warnings(summary: &Value) -> Vec<&str> {
 /// Largest angle in degrees between up as a run and as the truth has it, in the axes of the camera.
 fn tilt(place: &Workplace, name: &str) -> f64 {
     let poses = |path: &str| read_trajectory(&place.path(path)).unwrap();
-    let (estimate, truth) = (poses(&format!("{name}/trajectory.txt")), poses("data/groundtruth.txt"));
+    let (estimate, truth) = (poses(&format!("{name}/trajectory.txt")), poses("shaken/groundtruth.txt"));
     let times = |poses: &[TimedPose]| poses.iter().map(|pose| pose.timestamp).collect::<Vec<_>>();
     let angle = |pair: Match| {
         let up = estimate[pair.reference].world_from_camera.rotation.inverse() * Vector3::z();
@@ -68,7 +68,7 @@ fn the_world_stands_upright_where_gravity_or_somebody_says_where_up_is() {
     let first = read_trajectory(&place.path("given/trajectory.txt")).unwrap()[0].world_from_camera;
     assert!((first.rotation * -Vector3::y() - Vector3::z()).norm() < 1e-6, "exactly as given");
 
-    fs::remove_file(place.path("data/imu.csv")).unwrap();
+    fs::remove_file(place.path("shaken/imu.csv")).unwrap();
     let silent = run(&place, "track", "silent", &[]);
     assert_eq!(silent["upright"], Value::Null);
     let outcome = mba(["track", "data", "--out", "run", "--up", "w"]);
@@ -80,15 +80,15 @@ fn the_world_stands_upright_where_gravity_or_somebody_says_where_up_is() {
 fn exposure_times_that_the_motion_contradicts_are_named() {
     let place = Workplace::new();
     shaken(&place);
-    fs::remove_file(place.path("data/imu.csv")).unwrap();
+    fs::remove_file(place.path("shaken/imu.csv")).unwrap();
     let right = run(&place, "track", "right", &[]);
     assert_eq!(warnings(&right), [""; 0]);
-    place.edit("data/calibration.toml", "exposure_seconds = 0.016", "exposure_seconds = 0.008");
+    place.edit("shaken/calibration.toml", "exposure_seconds = 0.016", "exposure_seconds = 0.008");
     let wrong = run(&place, "track", "wrong", &[]);
     let [said] = warnings(&wrong)[..] else { panic!("{:?}", warnings(&wrong)) };
     assert!(said.starts_with("the motion within exposures is that of 1"), "{said}");
     assert!(said.contains(" where 8.0 ms are on record"), "{said}");
-    let info = mba([OsStr::new("info"), place.path("data").as_os_str(), OsStr::new("--json")]).json();
+    let info = mba([OsStr::new("info"), place.path("shaken").as_os_str(), OsStr::new("--json")]).json();
     assert!(warnings(&info).iter().any(|said| said.contains("where 8.0 ms are on record")), "{info}");
 }
 
@@ -96,10 +96,10 @@ fn exposure_times_that_the_motion_contradicts_are_named() {
 fn a_gyroscope_with_other_axes_is_named_and_left_out() {
     let place = Workplace::new();
     shaken(&place);
-    let info = || mba([OsStr::new("info"), place.path("data").as_os_str(), OsStr::new("--json")]).json();
+    let info = || mba([OsStr::new("info"), place.path("shaken").as_os_str(), OsStr::new("--json")]).json();
     assert_eq!(warnings(&info()), [""; 0]);
     // A quarter turn about the line of sight, as of a telephone that was held upright.
-    let calibration = place.path("data/calibration.toml");
+    let calibration = place.path("shaken/calibration.toml");
     let text = fs::read_to_string(&calibration).unwrap();
     let key = "imu_from_camera = [0, 1, 0, -1, 0, 0, 0, 0, 1]\n";
     let keys: String =
@@ -118,14 +118,14 @@ fn a_gyroscope_with_other_axes_is_named_and_left_out() {
 fn a_measured_length_tells_the_depth_scale() {
     let place = Workplace::new();
     shaken(&place);
-    fs::remove_file(place.path("data/imu.csv")).unwrap();
-    let truth = read_trajectory(&place.path("data/groundtruth.txt")).unwrap();
+    fs::remove_file(place.path("shaken/imu.csv")).unwrap();
+    let truth = read_trajectory(&place.path("shaken/groundtruth.txt")).unwrap();
     let place_of = |k: usize| truth[k].world_from_camera.translation;
     let farthest = (1..truth.len())
         .max_by(|a, b| (place_of(*a) - place_of(0)).norm().total_cmp(&(place_of(*b) - place_of(0)).norm()));
     let (to, metres) = (farthest.unwrap(), (place_of(farthest.unwrap()) - place_of(0)).norm());
-    place.edit("data/calibration.toml", "depth_scale = 5000.0", "depth_scale = 5400.0");
-    let data = place.path("data");
+    place.edit("shaken/calibration.toml", "depth_scale = 5000.0", "depth_scale = 5400.0");
+    let data = place.path("shaken");
     let calibrate = |distance: String| {
         let arguments = ["calibrate", "--json", "--distance", &distance].map(OsStr::new);
         mba(arguments.into_iter().chain([data.as_os_str()]))

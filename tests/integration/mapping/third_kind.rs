@@ -107,7 +107,11 @@ fn keyframe(sensor: &Sensor, index: usize, byte: u8) -> MapKeyframe {
         depth: vec![10_000; width * height],
     };
     let observation = ObservationPyramid::new(sensor, &frame, 2).expect("the frame has the camera's size");
-    MapKeyframe::new(index, observation, PathPrior { middle: RigidTransform::identity(), motion: None })
+    MapKeyframe::new(
+        index,
+        observation,
+        PathPrior { middle: RigidTransform::identity(), is_measured: true, motion: None },
+    )
 }
 
 #[test]

@@ -22,6 +22,8 @@ pub struct PathMetric {
     /// Tangent, translation in the camera frame, that a unit along each coordinate is.
     tangent_from_unit: Matrix6<f64>,
     unit_from_tangent: Matrix6<f64>,
+    /// Pixels that each component of a tangent moves the picture by, taken alone; translation in the camera frame.
+    pixels_from_tangent: Vector6<f64>,
 }
 
 impl PathMetric {
@@ -56,6 +58,7 @@ impl PathMetric {
         Self {
             tangent_from_unit: Matrix6::from_diagonal(&scale) * unscaled,
             unit_from_tangent: inverse * Matrix6::from_diagonal(&scale.map(|length| 1.0 / length)),
+            pixels_from_tangent: scale.map(|length| 1.0 / length),
         }
     }
 
@@ -65,7 +68,7 @@ impl PathMetric {
         let scale = Vector6::new(metres, metres, metres, radians, radians, radians);
         let [tangent_from_unit, unit_from_tangent] =
             [scale, scale.map(|length| 1.0 / length)].map(|scale| Matrix6::from_diagonal(&scale));
-        Self { tangent_from_unit, unit_from_tangent }
+        Self { tangent_from_unit, unit_from_tangent, pixels_from_tangent: scale.map(|length| 1.0 / length) }
     }
 
     /// The tangent, translation in the world, of a move given in units.
@@ -78,6 +81,15 @@ impl PathMetric {
     #[must_use]
     pub fn units(&self, path: &ExposurePath, tangent: &Vector6<f64>) -> Vector6<f64> {
         self.unit_from_tangent * turned(&path.mid().inverse(), tangent)
+    }
+
+    /// The gradient by units of half the squared pixels that a tangent is, each component taken alone: what turning and
+    /// shifting move the picture by does not cancel.
+    #[must_use]
+    pub fn grad_squared_pixels(&self, path: &ExposurePath, tangent: &Vector6<f64>) -> Vector6<f64> {
+        let own = turned(&path.mid().inverse(), tangent);
+        let squared = self.pixels_from_tangent.component_mul(&self.pixels_from_tangent);
+        self.tangent_from_unit.transpose() * own.component_mul(&squared)
     }
 
     /// The gradient by units from that by the tangent.

@@ -15,10 +15,22 @@ const BETA_2: f64 = 0.99;
 /// Cost of one standard deviation from the predicted motion, in units of the loss: far below what a blurred picture
 /// says about its motion, above the noise of a sharp one, which says nothing.
 const PRIOR_COST: f64 = 2e-5;
-/// Cost of a middle one pixel from where it was tracked, twice, in units of the loss.
-const MIDDLE_COST: f64 = 1e-3;
-/// Standard deviation of the bow, pixels: hands turn round within few exposures only.
-const BOW_PX: f64 = 2.0;
+/// Cost of a middle one pixel from where it was measured, twice, in units of the loss. A tracker sees the same pixels as the
+/// map, so that what it says counts about as much: squared gradient of the picture over its noise, 0.05^2 / 0.01.
+const MEASURED_COST: f64 = 0.25;
+/// The same of a middle that nobody has measured: enough to keep the scale.
+const GUESSED_COST: f64 = 1e-3;
+/// Most that either pulls, relative to one component of what the picture does.
+const MIDDLE_PULL: f64 = 3.0;
+/// Cost of one standard deviation of the bow, as [`PRIOR_COST`]. A picture says less about the shape of its motion than about
+/// its length: what a map does not explain would bend the path.
+const BOW_COST: f64 = 2e-3;
+/// Standard deviation of the bow as a share of the motion: a hand that shakes at 5 Hz bows that far within 25 ms.
+const BOW_SHARE: f64 = 0.1;
+/// And of the bow of a camera at rest, pixels.
+const LEAST_BOW_PX: f64 = 0.03;
+/// Mean share of the bow over an exposure: of `4 s (1 - s)`.
+const BOW_MEAN: f64 = 2.0 / 3.0;
 
 /// Longest move of a block, in lengths of the step.
 const LONGEST: f64 = 3.0;
@@ -27,7 +39,8 @@ const LONGEST: f64 = 3.0;
 ///
 /// The parameters are the middle, the motion from opening to closing and the bow, each six numbers in the units of a
 /// [`PathMetric`], which move the picture by about a pixel. In these coordinates the problem nearly falls apart into
-/// three: the middle says where the picture is, the motion how it is smeared, the bow in which shape. All directions
+/// three: the middle, the mean of the path, says where the picture is, the motion how it is smeared, the bow in which shape,
+/// without moving the mean. All directions
 /// share one scale of step, that of the middle, so that what the picture does not show hardly moves: Adam's own scales
 /// would let it wander.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -52,6 +65,8 @@ pub struct PathPrior {
     /// Where the tracker found the middle of the linear motion, `world_from_camera`. It measured every frame against
     /// depth; the scale of map and paths together, which no picture shows, would drift.
     pub middle: RigidTransform,
+    /// Whether the middle was measured, not guessed from neighbours.
+    pub is_measured: bool,
     /// Motion that the neighbours in time suggest.
     pub motion: Option<MotionPrediction>,
 }
@@ -101,7 +116,7 @@ impl PathMoments {
     }
 
     /// The gradients by middle, motion and bow with those of the prior, units of the metric. Motion and bow are never
-    /// pulled harder than a middle is by its picture, `typical`.
+    /// pulled harder than a middle is by its picture, `typical`, a middle not much harder.
     fn with_prior(
         &self,
         [middle, motion, bow]: [Vector6<f64>; 3],
@@ -110,14 +125,30 @@ impl PathMoments {
         prior: &PathPrior,
         metric: &PathMetric,
     ) -> [Vector6<f64>; 3] {
-        let drift = metric.units(path, &prior.middle.tangent_to(&path.ends.mid()));
+        let bowed = Vector6::from(self.bow_units);
+        // The middle of the linear motion, and what the bow has added to the mean since.
+        let drift = prior.middle.tangent_to(&path.ends.mid()) + metric.tangent(path, &bowed) * BOW_MEAN;
+        let cost = if prior.is_measured { MEASURED_COST } else { GUESSED_COST };
+        let grad_middle = metric.grad_squared_pixels(path, &drift) * cost;
         let grad_motion = metric.grad_units(path, &prior.grad_motion(path));
-        let grad_bow = Vector6::from(self.bow_units) * (PRIOR_COST / (BOW_PX * BOW_PX));
-        [middle + drift * MIDDLE_COST, motion + capped(grad_motion, typical), bow + capped(grad_bow, typical)]
+        let sigma = LEAST_BOW_PX + BOW_SHARE * prior.longest_motion(path, metric);
+        let grad_bow = bowed * (BOW_COST / (sigma * sigma));
+        [
+            middle + capped(grad_middle, MIDDLE_PULL * typical),
+            motion + capped(grad_motion, typical),
+            bow + capped(grad_bow, typical),
+        ]
     }
 }
 
 impl PathPrior {
+    /// Length of the motion, or of the one that is expected, units of the metric.
+    fn longest_motion(&self, path: &ExposurePath, metric: &PathMetric) -> f64 {
+        let length = |motion: &Vector6<f64>| metric.units(path, motion).norm();
+        let expected = self.motion.map_or(0.0, |prediction| length(&prediction.motion));
+        length(&path.ends.motion()).max(expected)
+    }
+
     /// Gradient of the prior by the motion.
     fn grad_motion(&self, path: &ExposurePath) -> Vector6<f64> {
         let Some(prediction) = self.motion else { return Vector6::zeros() };
@@ -137,14 +168,16 @@ fn capped(vector: Vector6<f64>, length: f64) -> Vector6<f64> {
 fn grad_coordinates(gradient: &SVector<f64, PATH_PARAMETERS>) -> [Vector6<f64>; 3] {
     let part = |first: usize| Vector6::from_iterator(gradient.iter().copied().skip(first).take(6));
     let [start, end, bow] = [part(0), part(6), part(12)];
-    [start + end, (end - start) * 0.5, bow]
+    [start + end, (end - start) * 0.5, bow - (start + end) * BOW_MEAN]
 }
 
 /// Tangents at both ends and the bow for moves of middle, motion and bow.
 fn from_coordinates([middle, motion, bow]: &[Vector6<f64>; 3]) -> SMatrix<f64, PATH_PARAMETERS, 1> {
     let mut step = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
-    step.fixed_rows_mut::<6>(0).copy_from(&(middle - motion * 0.5));
-    step.fixed_rows_mut::<6>(6).copy_from(&(middle + motion * 0.5));
+    // The chord recedes as the bow grows, so that the mean stays.
+    let chord = middle - bow * BOW_MEAN;
+    step.fixed_rows_mut::<6>(0).copy_from(&(chord - motion * 0.5));
+    step.fixed_rows_mut::<6>(6).copy_from(&(chord + motion * 0.5));
     step.fixed_rows_mut::<6>(12).copy_from(bow);
     step
 }
@@ -160,7 +193,7 @@ mod tests {
     const RADIANS: f64 = 0.002;
 
     fn prior() -> PathPrior {
-        PathPrior { middle: RigidTransform::identity(), motion: None }
+        PathPrior { middle: RigidTransform::identity(), is_measured: false, motion: None }
     }
 
     /// Minimises half the squared distance of the path's parameters from a target, in pixels.
@@ -170,8 +203,8 @@ mod tests {
         let metric = PathMetric::uniform(METRES, RADIANS);
         let unit = Vector6::new(METRES, METRES, METRES, RADIANS, RADIANS, RADIANS);
         let state = |path: &ExposurePath| {
-            let middle = RigidTransform::identity().tangent_to(&path.ends.mid());
-            [middle, path.ends.motion(), path.bow].map(|x| x.component_div(&unit))
+            let chord = RigidTransform::identity().tangent_to(&path.ends.mid());
+            [chord + path.bow * BOW_MEAN, path.ends.motion(), path.bow].map(|x| x.component_div(&unit))
         };
         for k in 0..400 {
             let now = state(&path);
@@ -179,7 +212,7 @@ mod tests {
             let mut gradient = SMatrix::<f64, PATH_PARAMETERS, 1>::zeros();
             gradient.fixed_rows_mut::<6>(0).copy_from(&(a * 0.5 - b));
             gradient.fixed_rows_mut::<6>(6).copy_from(&(a * 0.5 + b));
-            gradient.fixed_rows_mut::<6>(12).copy_from(&c);
+            gradient.fixed_rows_mut::<6>(12).copy_from(&(c + a * BOW_MEAN));
             let step = PathStep { pixels: 0.1 * 0.98_f64.powi(k), hold: [hold_middle, false, false] };
             moments.step(&mut path, &gradient, prior, &metric, step);
         }
@@ -207,10 +240,34 @@ mod tests {
     }
 
     #[test]
+    fn a_bow_leaves_the_mean_of_the_path() {
+        let bow = Vector6::new(0.01, 0.0, 0.0, 0.0, 0.0, 0.0);
+        let step = from_coordinates(&[Vector6::zeros(), Vector6::zeros(), bow]);
+        let path = ExposurePath::linear(ExposureTrajectory::still(RigidTransform::identity()));
+        let bent = path.perturbed(&step);
+        // Simpson's rule is exact for a parabola.
+        let mean =
+            (bent.at(0.0).translation + bent.at(0.5).translation * 4.0 + bent.at(1.0).translation) / 6.0;
+        assert!(mean.norm() < 1e-12, "{mean}");
+        assert!((bent.mid().translation.x - 0.01 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_middle_that_was_measured_holds_against_a_picture_that_pulls() {
+        // A picture that is best half a pixel off, as sharply as the noise of a tracker.
+        let target = [Vector6::new(0.5, 0.0, 0.0, 0.0, 0.0, 0.0), Vector6::zeros(), Vector6::zeros()];
+        let [guessed, ..] = descend(&target, &prior(), false);
+        assert!((guessed[0] - 0.5).abs() < 0.05, "{guessed}");
+        let [measured, ..] = descend(&target, &PathPrior { is_measured: true, ..prior() }, false);
+        // Costs of 1 and 0.25 by the squared pixel.
+        assert!((measured[0] - 0.4).abs() < 0.05, "{measured}");
+    }
+
+    #[test]
     fn without_a_picture_the_motion_is_the_predicted_one_and_the_middle_the_tracked_one() {
         let motion = Vector6::new(0.01, 0.0, -0.005, 0.0, 0.002, 0.0);
         let predicted = MotionPrediction { motion, translation_sigma: 0.01, rotation_sigma: 0.002 };
-        let prior = PathPrior { motion: Some(predicted), ..prior() };
+        let prior = PathPrior { motion: Some(predicted), is_measured: true, ..prior() };
         let away = Vector6::new(METRES, 0.0, 0.0, 0.0, RADIANS, 0.0);
         let mut path =
             ExposurePath::linear(ExposureTrajectory::still(RigidTransform::identity().perturbed(&away)));

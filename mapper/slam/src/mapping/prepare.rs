@@ -57,8 +57,12 @@ impl Frames {
         continuity: bool,
     ) -> Result<Self, MapError> {
         if !continuity {
-            let prior = |exposure| PathPrior { middle: motion_of(exposure).mid(), motion: None };
-            let priors = exposures.iter().map(prior).collect();
+            let prior = |(exposure, record): (_, &FrameRecord)| PathPrior {
+                middle: motion_of(exposure).mid(),
+                is_measured: record.status == FrameStatus::Ok,
+                motion: None,
+            };
+            let priors = exposures.iter().zip(records).map(prior).collect();
             let (exposures, records) = (exposures.to_vec(), records.to_vec());
             return Ok(Self::on_paths(dataset, exposures, records, priors, Vec::new(), continuity));
         }
@@ -70,8 +74,15 @@ impl Frames {
         let repaired = repair_run(exposures, records, &seconds, &settings, &compare)?;
         let frames = run_frames(&repaired.exposures, records, &seconds)?;
         let motions = predict_motions(&frames, &settings).into_iter();
-        let prior = |(motion, exposure)| PathPrior { middle: motion_of(exposure).mid(), motion };
-        let priors: Vec<PathPrior> = motions.zip(&repaired.exposures).map(prior).collect();
+        let is_in_place =
+            |verdict: FrameVerdict| matches!(verdict, FrameVerdict::Kept | FrameVerdict::Reversed);
+        let prior = |(index, (motion, exposure)): (usize, (_, &TimedExposure))| PathPrior {
+            middle: motion_of(exposure).mid(),
+            is_measured: records[index].status == FrameStatus::Ok
+                && is_in_place(repaired.continuity.verdicts[index]),
+            motion,
+        };
+        let priors: Vec<PathPrior> = motions.zip(&repaired.exposures).enumerate().map(prior).collect();
         let warnings = repairs(&repaired, "before");
         let records = records.to_vec();
         Ok(Self::on_paths(dataset, repaired.exposures, records, priors, warnings, continuity))

@@ -343,7 +343,7 @@ pub(super) fn keyframes(
         let reason = || "its size is not the camera's".to_owned();
         let observation = ObservationPyramid::new(sensor, image, LEVELS)
             .ok_or_else(|| SlamError::Keyframe { index: saved.index, reason: reason() })?;
-        let prior = PathPrior { middle: pose(saved.middle), motion: None };
+        let prior = PathPrior { middle: pose(saved.middle), is_measured: true, motion: None };
         Ok(MapKeyframe::new(saved.index, observation, prior))
     };
     saved.iter().zip(images).map(keyframe).collect()

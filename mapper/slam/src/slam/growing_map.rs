@@ -110,7 +110,7 @@ impl GrowingMap {
         let Some(observation) = ObservationPyramid::new(&self.sensor, image, LEVELS) else { return false };
         let path = self.path_over(exposure, image.exposure_seconds, image.depth_timestamp - image.timestamp);
         let path = if self.settings.blur { path } else { ExposurePath::still(path.mid()) };
-        let prior = PathPrior { middle: path.ends.mid(), motion: None };
+        let prior = PathPrior { middle: path.ends.mid(), is_measured: true, motion: None };
         let mut state = FrameState::new(path);
         // The gain of the keyframe next to it, but for what exposure control changed.
         state.log_gain = near.first().map_or(0.0, |near| self.log_gain(near.keyframe, &observation, &state));

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use mba_mapper::dataset::{Calibration, Dataset, DatasetError, Readout};
+use mba_mapper::dataset::{Calibration, Dataset, DatasetError, Shutter};
 use mba_mapper::run::Summary;
 use serde::Serialize;
 
@@ -82,7 +82,7 @@ impl Part {
         match self {
             Self::Rows => {
                 let mut calibration = dataset.calibration().clone();
-                calibration.readout = Readout::Global;
+                calibration.readout = Shutter::Global;
                 calibration.depth_readout_seconds = 0.0;
                 with_same_sensors(&dataset, calibration)
             }

@@ -19,7 +19,7 @@ one by positions and orientations, and the mesh is in the frame of that. In a ru
 is y-up, is turned to stand upright; with --align it keeps the axes of the other trajectory.
 
 Examples:
-  mba mesh mapped --out mesh.glb
+  mba mesh mapped --out mesh.glb --faces 50000
   mba mesh mapped --out mesh.ply --voxel-cm 0.5 --align data/groundtruth.txt")]
 pub struct MeshArgs {
     /// RUN folder with a map
@@ -37,6 +37,9 @@ pub struct MeshArgs {
     /// Parts that hang together with nothing else are left out below this area, in square centimetres
     #[arg(long, value_name = "CM2", default_value_t = 100.0, value_parser = non_negative)]
     pub least_area_cm2: f64,
+    /// At most so many triangles: edges are collapsed where that changes the surface least. Default: all
+    #[arg(long, value_name = "N")]
+    pub faces: Option<u32>,
     /// Trajectory of the run's frames in the frame that the mesh shall have, e.g. the ground truth
     #[arg(long, value_name = "TRAJECTORY")]
     pub align: Option<PathBuf>,

@@ -63,6 +63,9 @@ pub fn run(args: &MeshArgs, console: &Console) -> anyhow::Result<()> {
         let message = format!("no keyframe sees a surface in the map of {}", run.folder.display());
         return Err(failed(message, "look at the map with `mba report`; nothing was written"));
     }
+    if let Some(faces) = args.faces {
+        mesh = mesh.simplified(faces as usize);
+    }
     if let Some(alignment) = &alignment {
         mesh.transform(&alignment.reference_from_estimate);
     }

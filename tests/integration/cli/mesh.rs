@@ -110,6 +110,19 @@ fn a_wall_becomes_a_flat_coloured_mesh_of_what_was_seen() {
 }
 
 #[test]
+fn a_flat_wall_needs_few_faces() {
+    let place = workplace();
+    let full = mesh(place.path(), "full.ply", &["--voxel-cm", "4"]).json();
+    let few = mesh(place.path(), "few.ply", &["--voxel-cm", "4", "--faces", "100"]).json();
+    let mesh = read_mesh(&place.path().join("few.ply")).unwrap();
+    assert_eq!(number(&few, "/triangles"), mesh.triangles.len() as f64);
+    assert!(mesh.triangles.len() <= 100 && number(&full, "/triangles") > 1000.0, "{full} {few}");
+    assert!((number(&few, "/area_m2") - number(&full, "/area_m2")).abs() < 0.03, "{full} {few}");
+    assert!(mesh.vertices.iter().all(|[_, _, z]| (f64::from(*z) - WALL).abs() < 0.003));
+    assert!(mesh.colours.iter().all(|[red, _, blue]| *red > 250 && *blue == 0));
+}
+
+#[test]
 fn the_ending_chooses_the_format() {
     let place = workplace();
     let truth = place.path().join("groundtruth.txt").into_os_string().into_string().unwrap();

@@ -2,6 +2,7 @@
 
 mod depth_image;
 mod file;
+mod simplify;
 mod triangles;
 
 pub use crate::ply::PlyError;

@@ -6,12 +6,13 @@
 //! | [EuRoC](format_euroc) | a file of poses | camera to world, quaternion with w first | every frame |
 //! | [KITTI](format_kitti_poses) | poses and times | camera to world, 3x4 matrix | every frame |
 //! | [nerfstudio](format_transforms) | images, depth, points, cameras | camera to world, 4x4 matrix, axes of OpenGL | keyframes or every frame |
-//! | [COLMAP](format_images) | images, points, cameras | world to camera, quaternion with w first | keyframes or every frame |
+//! | [COLMAP](format_images) | images, points, cameras, as text and [binary](format_images_binary) | world to camera, quaternion with w first | keyframes or every frame |
 //!
 //! All of them get the poses at mid exposure, in the world of the run, in metres. Lost frames are left out. Images are
 //! undistorted; those of keyframes are the deblurred ones where the run has them.
 
 mod colmap;
+mod colmap_binary;
 mod error;
 mod euroc;
 mod frame_images;
@@ -25,6 +26,10 @@ mod tests;
 mod tum;
 
 pub use colmap::{CAMERAS_FILE, IMAGES_FILE, POINTS3D_FILE, format_cameras, format_images, format_points3d};
+pub use colmap_binary::{
+    BINARY_CAMERAS_FILE, BINARY_IMAGES_FILE, BINARY_POINTS3D_FILE, format_cameras_binary,
+    format_images_binary, format_points3d_binary,
+};
 pub use error::ExportError;
 pub use euroc::{format_euroc, is_own_euroc};
 pub use kitti::{POSES_FILE, TIMES_FILE, format_kitti_poses, format_kitti_times};

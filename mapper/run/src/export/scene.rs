@@ -10,8 +10,10 @@ use rayon::prelude::*;
 use super::frame_images::{FrameImages, ImageReader, check_data_set};
 use super::points::{add_depth_points, cloud_of_gaussians, depth_step};
 use super::{
-    CAMERAS_FILE, ExportError, IMAGES_FILE, POINTS_FILE, POINTS3D_FILE, PosedFrame, PosedFrames,
-    TRANSFORMS_FILE, format_cameras, format_images, format_points3d, format_transforms, image_name,
+    BINARY_CAMERAS_FILE, BINARY_IMAGES_FILE, BINARY_POINTS3D_FILE, CAMERAS_FILE, ExportError, IMAGES_FILE,
+    POINTS_FILE, POINTS3D_FILE, PosedFrame, PosedFrames, TRANSFORMS_FILE, format_cameras,
+    format_cameras_binary, format_images, format_images_binary, format_points3d, format_points3d_binary,
+    format_transforms, image_name,
 };
 use crate::run::{Run, RunCamera};
 
@@ -23,7 +25,7 @@ const FRAMES_AT_A_TIME: usize = 16;
 pub enum SceneLayout {
     /// Images, depth, points and `transforms.json`.
     Nerfstudio,
-    /// Images and a model as text.
+    /// Images and a model, as text and binary.
     Colmap,
 }
 
@@ -110,6 +112,9 @@ impl<'a> SceneExport<'a> {
             }
             SceneLayout::Colmap => {
                 names.extend([POINTS3D_FILE, IMAGES_FILE, CAMERAS_FILE].map(str::to_owned));
+                names.extend(
+                    [BINARY_POINTS3D_FILE, BINARY_IMAGES_FILE, BINARY_CAMERAS_FILE].map(str::to_owned),
+                );
             }
         }
         names
@@ -184,6 +189,9 @@ impl<'a> SceneExport<'a> {
                 folder.write(POINTS3D_FILE, format_points3d(cloud).as_bytes())?;
                 folder.write(IMAGES_FILE, format_images(frames).as_bytes())?;
                 folder.write(CAMERAS_FILE, format_cameras(camera).as_bytes())?;
+                folder.write(BINARY_POINTS3D_FILE, &format_points3d_binary(cloud))?;
+                folder.write(BINARY_IMAGES_FILE, &format_images_binary(frames))?;
+                folder.write(BINARY_CAMERAS_FILE, &format_cameras_binary(camera))?;
             }
         }
         Ok(())

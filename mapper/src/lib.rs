@@ -23,7 +23,7 @@ pub use mba_field::triplane;
 pub use mba_io::{
     BinaryFileError, FileError, checkpoint, dataset, imu, mesh, output, statistics, trajectory_file,
 };
-pub use mba_map::{infill, map, rendering, surfaces};
+pub use mba_map::{infill, map, rendering, surfaces, viewer_splats};
 pub use mba_raster::{exposure, gaussians, losses, raster, sensor};
 pub use mba_slam::{export, mapping, run, self_calibration, slam, tracking};
 pub use mba_synth as synth;

@@ -13,8 +13,9 @@ Poses are those at mid exposure, in the world of the run, in metres. Lost frames
   tum         a file: timestamp tx ty tz qx qy qz qw, camera-to-world
   euroc       a file: nanoseconds, position and quaternion with w first, camera-to-world
   kitti       a folder: poses.txt with 3x4 matrices, camera-to-world, and times.txt
+  splat       a file: the Gaussians of the map with colours for viewers, which blend display values
   nerfstudio  a folder: transforms.json (axes of OpenGL), images/, depth/ in millimetres, sparse_pc.ply
-  colmap      a folder: sparse/0 with cameras.txt, images.txt (world-to-camera), points3D.txt, and images/
+  colmap      a folder: sparse/0 with cameras, images (world-to-camera) and points3D, each as .txt and .bin, and images/
 
 Images are undistorted, as the pinhole intrinsics of nerfstudio and colmap say; the centre of the first pixel is (0.5, 0.5) \
 there. Keyframes are the deblurred ones where the run has them. Points are the centres of the Gaussians of the map, or \
@@ -22,6 +23,7 @@ come from depth where there is none. A file can be a pipe or device, and - is th
 
 Examples:
   mba export run --to tum --out poses.txt
+  mba export mapped --to splat --out scene.ply
   mba export mapped --to nerfstudio --out scene
   mba export mapped --to colmap --out model --images all --dataset data")]
 pub struct Export {
@@ -50,7 +52,7 @@ pub struct Export {
 pub enum ExportFormat {
     /// nerfstudio's transforms.json with images, depth and points
     Nerfstudio,
-    /// Model of COLMAP as text, with images
+    /// Model of COLMAP as text and binary, with images
     Colmap,
     /// Poses of the KITTI odometry benchmark
     Kitti,
@@ -58,6 +60,8 @@ pub enum ExportFormat {
     Euroc,
     /// Trajectory of the TUM RGB-D benchmark
     Tum,
+    /// File of Gaussian splats that viewers show as the map looks
+    Splat,
 }
 
 impl ExportFormat {
@@ -67,7 +71,7 @@ impl ExportFormat {
         match self {
             Self::Nerfstudio => Some(SceneLayout::Nerfstudio),
             Self::Colmap => Some(SceneLayout::Colmap),
-            Self::Kitti | Self::Euroc | Self::Tum => None,
+            Self::Kitti | Self::Euroc | Self::Tum | Self::Splat => None,
         }
     }
 }

@@ -8,9 +8,13 @@ use mba_mapper::export::{
     ExportError, POSES_FILE, PosedFrame, PosedFrames, SceneExport, SceneLayout, TIMES_FILE, format_euroc,
     format_kitti_poses, format_kitti_times, format_tum, is_own_euroc, is_own_tum,
 };
+use mba_mapper::gaussians::format_ply_for_viewers;
 use mba_mapper::map::{MAP_FILE, StoredMap};
 use mba_mapper::output::{ExportFolder, OutputFile, Permission};
-use mba_mapper::run::{EXPOSURES_FILE, FRAMES_FILE, Run, SUMMARY_FILE, TRAJECTORY_FILE, path_of};
+use mba_mapper::run::{
+    EXPOSURES_FILE, FRAMES_FILE, FrameStatus, Run, SUMMARY_FILE, TRAJECTORY_FILE, for_viewers, is_own_splats,
+    path_of,
+};
 use serde::Serialize;
 
 use super::open;
@@ -46,6 +50,7 @@ pub fn run(args: &Export, console: &Console) -> anyhow::Result<()> {
         (Some(layout), _) => scene(args, &run, layout, console),
         (None, ExportFormat::Euroc) => trajectory(args, &run, format_euroc, is_own_euroc, console),
         (None, ExportFormat::Kitti) => kitti(args, &run, console),
+        (None, ExportFormat::Splat) => splats(args, &run, console),
         (None, _) => trajectory(args, &run, format_tum, is_own_tum, console),
     }
 }
@@ -94,6 +99,33 @@ fn kitti(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
     }
     folder.finish().or_else(refuse)?;
     console.result(&written(args, posed.frames.len(), posed.lost, None), table)
+}
+
+/// Writes the Gaussians of the map with colours for viewers.
+fn splats(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
+    let folder = run.folder.display();
+    let StoredMap::Gaussians(map) = open::map(run)? else {
+        let message =
+            format!("the map of {folder} is a tri-plane field, which viewers of splats do not know");
+        return Err(bad_input(message, "`mba mesh` makes a surface of it"));
+    };
+    let Some(camera) = &run.summary.settings.camera else {
+        return Err(bad_input(format!("{folder} does not tell its camera"), "make the run again"));
+    };
+    let inputs = inputs(args, run);
+    let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    let permission = Permission { force: args.force, inputs: &inputs };
+    let out = OutputFile::claim(&args.out, &permission, is_own_splats).or_else(refuse)?;
+    let response = camera.inverse_response().or_bad_input("make the run again")?;
+    let viewing = for_viewers(&map, camera.pinhole(), &response, &run.exposures, &run.frames);
+    out.write(&format_ply_for_viewers(&map, &viewing)).or_else(unwritable)?;
+    let lost = run.frames.iter().filter(|frame| frame.status == FrameStatus::Lost).count();
+    let written = written(args, run.frames.len() - lost, lost, Some(map.len()));
+    if out.is_stdout() {
+        console.note(table(&written).trim_end());
+        return Ok(());
+    }
+    console.result(&written, table)
 }
 
 /// Writes images, cameras and points.

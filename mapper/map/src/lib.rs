@@ -4,3 +4,4 @@ pub mod infill;
 pub mod map;
 pub mod rendering;
 pub mod surfaces;
+pub mod viewer_splats;

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use mba_mapper::gaussians::{Gaussian, Gaussians, PlyError, format_ply, parse_ply, read_ply, write_ply};
+use mba_mapper::gaussians::{
+    ForViewers, Gaussian, Gaussians, PlyError, format_ply, format_ply_for_viewers, parse_ply, read_ply,
+    write_ply,
+};
 use mba_tests::transfer_scene::Uniform;
 
 fn random_map(count: usize) -> Gaussians {
@@ -60,6 +63,34 @@ fn the_file_has_the_size_and_colours_of_the_usual_form() {
     // White is display colour 1, i.e. the coefficient (1 - 0.5)/0.28209479.
     assert!((number(6) - 1.772_453_9).abs() < 1e-6, "{}", number(6));
     assert_eq!(number(13), 1.0, "the quaternion is not of unit length");
+}
+
+#[test]
+fn colours_for_viewers_do_not_change_the_map_that_is_read() {
+    let broken = Gaussian { mean: [f32::NAN, 0.0, 0.0], ..Gaussian::default() };
+    let map: Gaussians =
+        [broken].into_iter().chain((0..100).filter_map(|k| random_map(100).get(k))).collect();
+    let planes = [0.0_f32, 0.25, 1.0].map(|value| (0..101).map(|k| value * k as f32 / 100.0).collect());
+    let log_scales = [-3.0, -2.0, -1.0].map(|scale| vec![scale; 101]);
+    let comments = vec!["Vertical axis: y".to_owned()];
+    let bytes = format_ply_for_viewers(&map, &ForViewers { colours: planes, log_scales, comments });
+    let (read, plain) = (parse(&bytes).unwrap(), parse(&format_ply(&map)).unwrap());
+    assert_eq!(read.len(), 100);
+    let bits = |map: &Gaussians| map.planes().iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
+    assert_eq!(bits(&read), bits(&plain));
+    assert!(bytes.starts_with(b"ply\nformat binary_little_endian 1.0\ncomment Vertical axis: y\n"));
+    // The last record, as programs read it that know nothing of the properties behind the usual ones.
+    let body = &bytes[bytes.len() - 23 * 4..];
+    let number = |k: usize| f32::from_le_bytes(body[4 * k..4 * k + 4].try_into().unwrap());
+    for (k, display) in [(6, 0.0), (7, 0.25), (8, 1.0_f32)] {
+        assert!((0.282_094_79 * number(k) + 0.5 - display).abs() < 1e-6, "channel {k}: {}", number(k));
+    }
+    assert_eq!([10, 11, 12].map(number), [-3.0, -2.0, -1.0]);
+    // With only some of the map's own properties there are none.
+    let partly = String::from_utf8_lossy(&bytes).find("mba_dc_1").unwrap();
+    let mut bytes = bytes;
+    bytes[partly..partly + 3].copy_from_slice(b"abc");
+    assert!(parse(&bytes).unwrap().planes()[11].iter().all(|red| *red == 0.0));
 }
 
 /// Properties in another order, of other types, with others in between, behind another element.

@@ -11,7 +11,16 @@ pub(super) fn coefficient_of(linear: f32) -> f32 {
     let magnitude = f64::from(linear.abs());
     let display =
         if magnitude <= 0.003_130_8 { 12.92 * magnitude } else { 1.055 * magnitude.powf(1.0 / 2.4) - 0.055 };
-    ((display.copysign(f64::from(linear)) - 0.5) / SH_DEGREE_0) as f32
+    coefficient_of_value(display.copysign(f64::from(linear)))
+}
+
+/// The coefficient of spherical harmonics of degree 0 that shows as the display value `display`.
+pub(super) fn coefficient_of_display(display: f32) -> f32 {
+    coefficient_of_value(f64::from(display))
+}
+
+fn coefficient_of_value(display: f64) -> f32 {
+    ((display - 0.5) / SH_DEGREE_0) as f32
 }
 
 /// The inverse of [`coefficient_of`].

@@ -6,7 +6,7 @@
 //! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
 //! | `frames.csv` | one [`FrameRecord`] per frame |
 //! | `summary.json` | a [`Summary`] |
-//! | `map.ply` | a map of Gaussians, see [`mba_raster::gaussians::read_ply`], or |
+//! | `map.ply` | a map of Gaussians, see [`mba_raster::gaussians::read_ply`], with [colours and sizes for viewers](for_viewers), or |
 //! | `map.mbaf` | a map that is a tri-plane field, see [`mba_field::triplane::read_field`] |
 //! | `deblurred/NNNNNN.png` | the deblurred image of every keyframe, named by the index of the frame |
 //!
@@ -19,11 +19,13 @@ mod error;
 mod frame_record;
 mod keyframe_images;
 mod merit;
+mod orientation;
 mod reader;
 mod rows;
 mod stored_path;
 mod summary;
 mod upright;
+mod viewing;
 mod writer;
 
 pub use camera::{RunCamera, RunResponse};
@@ -31,11 +33,13 @@ pub use deblurred_keyframes::write_deblurred_keyframes;
 pub use error::RunError;
 pub use frame_record::{FrameRecord, Reason};
 pub use merit::{Merit, mid_pose, plausibility, trajectory_figures};
+pub use orientation::{start_view, up_direction};
 pub use reader::Run;
 pub use rows::RunRows;
 pub use stored_path::{path_of, stored_path};
 pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use upright::{UpSource, Upright};
+pub use viewing::{for_viewers, is_own_splats};
 pub use writer::RunWriter;
 
 /// How far the pose of a frame can be trusted, as the tracker says it.

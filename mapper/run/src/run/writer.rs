@@ -9,7 +9,7 @@ use mba_io::output::{OutputFolder, Permission};
 use mba_io::trajectory_file::{TimedExposure, TimedPose, format_exposures, format_trajectory};
 use mba_io::whole_file::write_together;
 use mba_map::map::{FIELD_FILE, MAP_FILE, Scene, StoredMap};
-use mba_raster::gaussians::write_ply;
+use mba_raster::gaussians::{ForViewers, Gaussians, write_ply, write_ply_for_viewers};
 use mba_tracker::geometry::RigidTransform;
 
 use super::earlier_images::remove_keyframe_images;
@@ -217,6 +217,15 @@ impl RunWriter {
             }
         };
         remove(&self.folder().join(other))
+    }
+
+    /// Writes a map of Gaussians that viewers show as it looks, see [`for_viewers`](super::for_viewers).
+    ///
+    /// # Errors
+    /// As [`Self::create`].
+    pub fn write_map_for_viewers(&self, map: &Gaussians, viewing: &ForViewers) -> Result<(), RunError> {
+        write_ply_for_viewers(&self.folder().join(MAP_FILE), map, viewing).map_err(RunError::from_write)?;
+        remove(&self.folder().join(FIELD_FILE))
     }
 
     /// Bytes of the file of the map; 0 without one.

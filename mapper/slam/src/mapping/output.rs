@@ -6,12 +6,13 @@ use mba_adjust::bundle::BundleAdjustment;
 use mba_adjust::deblurring::{DeblurMemory, KeyframeDeblurrer, LONGEST_BLUR, Reblurred};
 use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
+use mba_map::map::Scene;
 use mba_map::rendering::{Behind, ViewRenderer};
 use mba_tracker::SimdLevel;
 use rayon::prelude::*;
 
 use super::prepare::Frames;
-use crate::run::{RunError, RunWriter};
+use crate::run::{RunError, RunWriter, for_viewers};
 use crate::tracking::{TrackingOptions, tracker_config};
 
 /// Fills a run with the poses that it starts from, and brings its folder up to date: from here on it replaces an
@@ -41,7 +42,7 @@ pub(super) fn write(
     for (index, (exposure, (_, log_gain))) in exposures.iter().zip(refined).enumerate() {
         writer.refine(index, *exposure, log_gain.exp(), is_keyframe[index]);
     }
-    writer.write_map(&bundle.state.map)?;
+    write_map(writer, dataset, bundle)?;
     let config = tracker_config(dataset, &TrackingOptions::default());
     let deblurrer = KeyframeDeblurrer::new(&config, SimdLevel::new());
     let count = bundle.keyframes().len();
@@ -64,6 +65,17 @@ pub(super) fn write(
         }
     }
     Ok(())
+}
+
+/// Writes the map; Gaussians with colours for viewers, too.
+fn write_map(writer: &RunWriter, dataset: &Dataset, bundle: &BundleAdjustment) -> Result<(), RunError> {
+    let Scene::Gaussians(map) = Scene::from(&bundle.state.map) else {
+        return writer.write_map(&bundle.state.map);
+    };
+    let calibration = dataset.calibration();
+    let response = calibration.response.inverse();
+    let viewing = for_viewers(map, calibration.camera, &response, writer.exposures(), writer.frames());
+    writer.write_map_for_viewers(map, &viewing)
 }
 
 /// What the picture of keyframe `k` is compared with to find detail.

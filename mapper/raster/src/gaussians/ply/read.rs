@@ -5,9 +5,9 @@ use std::path::Path;
 use mba_io::ply::{Element, Header, PlyError, Records};
 use mba_io::whole_file::read;
 
-use super::NAMES;
+use super::{MAP_NAMES, NAMES};
 use crate::gaussians::display_colour::linear_of;
-use crate::gaussians::store::{COLOUR, Gaussian, Gaussians, OPACITY_LOGIT, PARAMETERS};
+use crate::gaussians::store::{COLOUR, Gaussian, Gaussians, LOG_SCALE, OPACITY_LOGIT, PARAMETERS};
 
 /// What stands for an infinite logit of an opacity: the logistic function of it is 1 in single precision.
 const OPAQUE_LOGIT: f32 = 30.0;
@@ -23,7 +23,7 @@ pub fn read_ply(path: &Path) -> Result<Gaussians, PlyError> {
 
 /// The Gaussians of a file with the content `bytes`; `path` only names it in errors.
 ///
-/// Display colours become linear light. Other properties are ignored, among them spherical harmonics of higher
+/// Display colours become linear light; those of `mba_dc`, where the file has them, else of `f_dc`. Other properties are ignored, among them spherical harmonics of higher
 /// degrees: colours are those seen from the mean direction.
 ///
 /// # Errors
@@ -60,11 +60,17 @@ pub fn parse_ply(path: &Path, bytes: &[u8]) -> Result<Gaussians, PlyError> {
     Err(missing(path, NAMES[0]))
 }
 
-/// Where the parameters are, in the order of [`NAMES`].
+/// Where the parameters are, in the order of [`NAMES`]. What is the map's own goes before what is for viewers.
 fn fields(path: &Path, vertex: &Element) -> Result<[usize; PARAMETERS], PlyError> {
     let mut fields = [0; PARAMETERS];
     for (field, name) in fields.iter_mut().zip(NAMES) {
         *field = vertex.number(name).ok_or_else(|| missing(path, name))?;
+    }
+    let own: Vec<usize> = MAP_NAMES.iter().filter_map(|name| vertex.number(name)).collect();
+    if own.len() == MAP_NAMES.len() {
+        let (colours, scales) = own.split_at(3);
+        fields[COLOUR..].copy_from_slice(colours);
+        fields[LOG_SCALE..LOG_SCALE + 3].copy_from_slice(scales);
     }
     Ok(fields)
 }

@@ -75,10 +75,12 @@ pub enum Command {
     Render(Render),
     /// Write the surface of the map of a RUN folder as a coloured mesh
     Mesh(surface::MeshArgs),
-    /// Write a RUN folder in the format of another program: nerfstudio, COLMAP, KITTI, EuRoC, TUM
+    /// Write a RUN folder in the format of another program: nerfstudio, COLMAP, splats, KITTI, EuRoC, TUM
     Export(export::Export),
     /// Write report.html, charts and pictures into a RUN folder
     Report(Report),
+    /// Walk through the map of a RUN folder in a browser
+    View(View),
     /// Measure an estimate against a reference
     #[command(subcommand)]
     Eval(EvalCommand),
@@ -286,7 +288,7 @@ pub enum ViewNames {
 /// Arguments of `mba report`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-The report is one HTML file without network access: charts, figures and settings of the run. The charts are in \
+The report is one HTML file without network access: the map to walk through, charts, figures and settings of the run. The charts are in \
 plots/ as well, and pictures/ gets the most blurred keyframes, captured, deblurred and true side by side with the \
 estimated motion drawn into the captured one, a detail of each, and views of the map.
 
@@ -300,6 +302,31 @@ pub struct Report {
     #[arg(long, value_name = "DIR")]
     pub dataset: Option<PathBuf>,
     /// Write also over files that this program did not write
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Arguments of `mba view`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+RUN gets view.html, one file without network access that any browser of today shows: the map, the path of the camera with \
+every exposure as an arc, and the keyframes, captured and deblurred. `mba report` has the same in its page. An address \
+that ends in #frame=12 starts at that keyframe.
+
+Examples:
+  mba view mapped
+  mba view mapped --no-open")]
+pub struct View {
+    /// RUN folder with a map of Gaussians
+    #[arg(value_name = "RUN")]
+    pub run: PathBuf,
+    /// Data set of the run, if it has moved since
+    #[arg(long, value_name = "DIR")]
+    pub dataset: Option<PathBuf>,
+    /// Write the page without opening it
+    #[arg(long)]
+    pub no_open: bool,
+    /// Write also over a file that this program did not write
     #[arg(long)]
     pub force: bool,
 }

@@ -72,6 +72,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Mesh(args) => commands::mesh::run(args, console),
         Command::Export(args) => commands::export::run(args, console),
         Command::Report(args) => commands::report::run(args, console),
+        Command::View(args) => commands::view::run(args, console),
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
         Command::Eval(EvalCommand::Images(args)) => commands::eval_images::run(args, console),
         Command::Eval(EvalCommand::Mesh(args)) => commands::eval_mesh::run(args, console),

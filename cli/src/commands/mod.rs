@@ -19,3 +19,4 @@ pub mod report;
 pub mod slam;
 pub mod synth;
 pub mod track;
+pub mod view;

@@ -5,9 +5,10 @@ use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
 use mba_mapper::map::{FIELD_FILE, MAP_FILE, StoredMap};
-use mba_mapper::run::{Run, RunError};
+use mba_mapper::run::{Run, RunError, path_of};
 use mba_mapper::self_calibration::read_back;
 
+use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input};
 
 /// Opens a data set.
@@ -28,6 +29,27 @@ pub fn run(folder: &Path) -> anyhow::Result<Run> {
         _ => "track the sequence again, or restore the file",
     };
     Run::open(folder).map_err(|error| (hint(&error), error)).or_else(advise)
+}
+
+/// The data set in `folder`, or else the run's own if it is there: a report lacks captured images and truth without it,
+/// nothing else.
+///
+/// # Errors
+/// Bad input with advice for a folder that was named.
+pub fn dataset_if_there(
+    run: &Run,
+    folder: Option<&Path>,
+    console: &Console,
+) -> anyhow::Result<Option<Dataset>> {
+    if let Some(folder) = folder {
+        return dataset(folder).map(Some);
+    }
+    let opened = dataset::open(&path_of(&run.summary.settings.dataset));
+    if let Err(error) = &opened {
+        let hint = "--dataset names another place";
+        console.warning(format!("there are no captured images and no truth to show, {error}; {hint}"));
+    }
+    Ok(opened.ok())
 }
 
 /// The data set with what the run found about its camera.

@@ -8,10 +8,10 @@ use serde_json::Value;
 use super::plots::Plot;
 use super::table::{map_rows, percent, slam_rows};
 
-const STYLE: &str = include_str!("style.css");
+pub(super) const STYLE: &str = include_str!("style.css");
 
 /// What follows the title of a page.
-const TITLE_END: &str = " · mba</title>";
+pub(super) const TITLE_END: &str = " · mba</title>";
 
 /// Whether a file that begins with `start` is a page as [`page`] makes it.
 #[must_use]
@@ -67,7 +67,7 @@ pub(super) fn page(run: &Run, plots: &[Plot], pictures: &str) -> String {
     )
 }
 
-fn data_set_name(summary: &Summary) -> String {
+pub(super) fn data_set_name(summary: &Summary) -> String {
     let path = path_of(&summary.settings.dataset);
     path.file_name().map_or_else(|| "run".to_owned(), |name| name.to_string_lossy().into_owned())
 }

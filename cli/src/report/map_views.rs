@@ -10,9 +10,16 @@ use mba_mapper::run::{Run, RunCamera};
 
 use super::html::escape;
 use super::pictures::jpeg_base64;
+use super::viewer::{self, Extent};
 
 /// Width in pixels that pictures are reduced to.
 const WIDTH: u32 = 480;
+
+/// What the viewer in a report shows.
+const IN_REPORT: Extent = Extent { keyframes: 24, columns: 320 };
+
+/// Most Gaussians in a report: they take 5 MB.
+const MOST_GAUSSIANS: usize = 150_000;
 
 /// What is shown of the map of a run.
 pub(super) struct MapViews {
@@ -20,6 +27,8 @@ pub(super) struct MapViews {
     pub(super) views: Vec<(usize, RgbImage)>,
     /// What the map is, or why it cannot be read, as HTML; none for a run without a map.
     about: Option<String>,
+    /// The viewer as HTML; empty for a map that it does not show.
+    viewer: String,
 }
 
 impl MapViews {
@@ -29,7 +38,7 @@ impl MapViews {
     /// # Errors
     /// When the response of the run's camera is none.
     pub(super) fn new(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<Self> {
-        let none = Self { views: Vec::new(), about: None };
+        let none = Self { views: Vec::new(), about: None, viewer: String::new() };
         let Some(path) = StoredMap::path(&run.folder) else { return Ok(none) };
         let Ok(file) = fs::metadata(&path) else { return Ok(none) };
         let map = match StoredMap::read(&path) {
@@ -51,8 +60,18 @@ impl MapViews {
         };
         let own = run.summary.settings.camera.clone();
         let camera = own.or_else(|| dataset.map(|dataset| RunCamera::from(dataset.calibration())));
-        let views = camera.map(|camera| views(run, &map, &camera)).transpose()?.unwrap_or_default();
-        Ok(Self { views, about: Some(format!("<p class=\"note\">{about}</p>\n")) })
+        let shown = camera.as_ref().map(|camera| views(run, &map, camera)).transpose()?.unwrap_or_default();
+        let viewer = match (&map, &camera) {
+            (StoredMap::Gaussians(map), Some(camera)) if map.len() <= MOST_GAUSSIANS => {
+                viewer::section(run, (map, camera), dataset, IN_REPORT)?
+            }
+            (StoredMap::Gaussians(_), Some(_)) => {
+                "<p class=\"note\">It is too large for this page; <code>mba view</code> shows it.</p>\n"
+                    .to_owned()
+            }
+            _ => String::new(),
+        };
+        Ok(Self { views: shown, about: Some(format!("<p class=\"note\">{about}</p>\n")), viewer })
     }
 
     /// The section of the page; empty for a run without a map.
@@ -66,7 +85,7 @@ impl MapViews {
             true => String::new(),
             false => format!("<section class=\"panes\">\n{figures}</section>\n"),
         };
-        Ok(format!("<h2>Map</h2>\n{about}{panes}"))
+        Ok(format!("<h2>Map</h2>\n{about}{}{panes}", self.viewer))
     }
 }
 

@@ -13,14 +13,16 @@ mod plots;
 mod side_by_side;
 pub mod table;
 mod view;
+mod viewer;
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use mba_mapper::FileError;
 use mba_mapper::dataset::Dataset;
+use mba_mapper::gaussians::Gaussians;
 use mba_mapper::output::{OutputFile, Permission};
-use mba_mapper::run::Run;
+use mba_mapper::run::{Run, RunCamera};
 
 use crate::written_run::refuse;
 
@@ -29,6 +31,8 @@ pub use view::RunView;
 
 /// Name of the report in a RUN folder.
 pub const REPORT_FILE: &str = "report.html";
+/// Name of the page with the viewer in a RUN folder.
+pub const VIEW_FILE: &str = "view.html";
 /// Name of the folder of charts in a RUN folder.
 pub const PLOTS_FOLDER: &str = "plots";
 /// Name of the folder of pictures in a RUN folder.
@@ -66,6 +70,23 @@ pub fn write(run: &Run, dataset: Option<&Dataset>, force: bool) -> anyhow::Resul
     }
     page.write(html::page(run, &plots, &sections).as_bytes())?;
     Ok(report)
+}
+
+/// Writes the page with the viewer of `map` into the folder of a run, over an earlier one, and with `force` over a file of
+/// others. Returns its path.
+///
+/// # Errors
+/// When the file cannot be written or a picture cannot be made.
+pub fn write_view(
+    run: &Run,
+    map: (&Gaussians, &RunCamera),
+    dataset: Option<&Dataset>,
+    force: bool,
+) -> anyhow::Result<PathBuf> {
+    let path = run.folder.join(VIEW_FILE);
+    let file = claim(&path, force, html::is_own_page)?;
+    file.write(viewer::page(run, map, dataset)?.as_bytes())?;
+    Ok(path)
 }
 
 fn claim(path: &Path, force: bool, is_own: impl Fn(&[u8]) -> bool) -> anyhow::Result<OutputFile> {

@@ -171,10 +171,29 @@ fn the_report_shows_the_map() {
     for frame in [0, 2, 4] {
         assert!(shown.contains(&format!("Rendered from frame {frame}.")), "frame {frame}");
     }
+    assert!(shown.contains("class=\"viewer\"") && shown.contains("\"focal\":"), "{shown}");
     fs::write(run.join("map.ply"), "not a map").unwrap();
     assert!(page().contains("is not a PLY file"));
     fs::remove_file(run.join("map.ply")).unwrap();
     assert!(!page().contains("<h2>Map</h2>"));
+}
+
+#[test]
+fn a_page_with_the_map_asks_for_nothing_else() {
+    let place = workplace(Some(camera()));
+    let run = place.path().join("run");
+    let view = |run: &Path| mba([Path::new("view"), run, Path::new("--no-open")]);
+    assert_eq!(view(&run).code, Some(0));
+    let page = fs::read_to_string(run.join("view.html")).unwrap();
+    for element in ["<title>data · mba</title>", "class=\"gaussians\">", "\"up\":[", "\"exposures\":[["] {
+        assert!(page.contains(element), "{element}");
+    }
+    for outside in ["http:", "https:", "src=\"/", "href=", "@import", "url("] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+    fs::write(run.join("view.html"), "my own").unwrap();
+    view(&run).assert_error(2, &["view.html", "did not write"]);
+    view(place.path()).assert_error(2, &["summary.json"]);
 }
 
 #[test]

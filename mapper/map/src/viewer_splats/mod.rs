@@ -8,14 +8,14 @@
 //! for which blended display values come as near as can be to the views of the map: those of a linear least-squares problem,
 //! with a row per pixel of some views and an unknown per Gaussian and channel.
 //!
-//! It is solved by [conjugate gradients](solve) on the normal equations, for which the matrix is never stored: the rasterizer
-//! [multiplies with it](blending) by rendering, and with its transpose by taking a gradient back.
+//! It is solved by conjugate gradients on the normal equations, for which the matrix is never stored: the rasterizer
+//! multiplies with it by rendering, and with its transpose by taking a gradient back.
 //!
 //! # Sizes
 //!
 //! A rasterizer makes every splat thicker, by a variance of 0.3 pixels squared, so that none falls between pixels. Where a
 //! viewer has more pixels than the recording, or adds less, splats that touched in the recording leave gaps and needles; and
-//! viewers cut the border of a splat, which makes it smaller. So [most of it](sizes) is in the Gaussians themselves, measured at
+//! viewers cut the border of a splat, which makes it smaller. So most of it is in the Gaussians themselves, measured at
 //! the nearest keyframe (as in Yu et al. 2024, Mip-Splatting), for screens with some two pixels along one of the recording.
 
 mod blending;

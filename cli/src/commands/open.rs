@@ -80,7 +80,8 @@ where
     Err(error).or_bad_input(hint)
 }
 
-fn dataset_hint(error: &DatasetError) -> Cow<'static, str> {
+/// What to do about a data set that cannot be used.
+pub(super) fn dataset_hint(error: &DatasetError) -> Cow<'static, str> {
     let hint = match error {
         DatasetError::File(_) => "correct that line or file",
         DatasetError::UnknownLayout { .. } => "give the folder that holds the lists of images",
@@ -97,7 +98,7 @@ fn dataset_hint(error: &DatasetError) -> Cow<'static, str> {
             .into();
         }
         DatasetError::DepthSize { .. } => {
-            "enlarge the depth images by repeating pixels, or reduce the colour images and the calibration to their size"
+            "docs/formats.md shows the section; a camera that sees more than colour does needs one, too"
         }
         DatasetError::SizeMismatch { .. } => "the calibration must be that of the stored image size",
         _ => "see `mba info --help` for what a data set needs",

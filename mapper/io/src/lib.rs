@@ -12,6 +12,7 @@ pub mod mesh;
 pub mod output;
 pub mod ply;
 pub mod png;
+mod pose_matrix;
 pub mod run_layout;
 pub mod statistics;
 pub mod text_lines;

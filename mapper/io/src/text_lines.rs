@@ -6,7 +6,7 @@ use crate::FileError;
 use crate::whole_file::read_text;
 
 /// A whole text file; lines that are blank or start with `#` are skipped but counted.
-pub(crate) struct TextFile {
+pub struct TextFile {
     path: PathBuf,
     text: String,
 }
@@ -26,12 +26,12 @@ impl TextFile {
     ///
     /// # Errors
     /// See [`read_text`].
-    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
+    pub fn read(path: &Path) -> Result<Self, FileError> {
         Ok(Self { path: path.to_owned(), text: read_text(path)? })
     }
 
     /// The lines that say something.
-    pub(crate) fn lines(&self) -> impl Iterator<Item = Line<'_>> {
+    pub fn lines(&self) -> impl Iterator<Item = Line<'_>> {
         self.text
             .lines()
             .enumerate()

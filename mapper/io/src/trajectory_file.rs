@@ -10,6 +10,7 @@ use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use crate::FileError;
+use crate::pose_matrix::pose_from_rows;
 use crate::text_lines::{Line, TextFile};
 use crate::whole_file::write_text;
 
@@ -50,7 +51,9 @@ impl TimedExposure {
     }
 }
 
-/// Reads a TUM trajectory: lines `timestamp tx ty tz qx qy qz qw` with increasing timestamps.
+/// Reads a trajectory: lines `timestamp tx ty tz qx qy qz qw` of TUM with increasing timestamps. Lines of nanoseconds,
+/// position and quaternion with w first, as EuRoC's ground truth has them, and lines of 16 numbers, as Replica's `traj.txt`
+/// has them at 30 per second, are told by the first of them.
 ///
 /// # Errors
 ///
@@ -58,7 +61,67 @@ impl TimedExposure {
 /// [`QUATERNION_LENGTH_TOLERANCE`] from unit length, or timestamps are doubled or out of order.
 pub fn read_trajectory(path: &Path) -> Result<Vec<TimedPose>, FileError> {
     let file = TextFile::read(path)?;
-    parsed(&file, POSE_LINE, pose_of_line).collect()
+    match Form::of(&file) {
+        Form::Tum => parsed(&file, POSE_LINE, pose_of_line).collect(),
+        Form::Euroc => in_order(file.lines().map(|line| Ok((line, pose_of_euroc(&line)?)))),
+        Form::Matrices => in_order(file.lines().enumerate().map(|(index, line)| {
+            let rows = line.numbers("the 16 numbers of a 4x4 camera-to-world matrix, row by row")?;
+            let world_from_camera = pose_from_rows(&rows, path, line.number)?;
+            Ok((line, TimedPose { timestamp: index as f64 / MATRIX_RATE, world_from_camera }))
+        })),
+    }
+}
+
+/// Lines per second of a trajectory without times: those of Replica as rendered for NICE-SLAM.
+const MATRIX_RATE: f64 = 30.0;
+
+/// Least number that is taken for a time in nanoseconds: half a day, or 12 million years in seconds.
+const LEAST_NANOSECONDS: f64 = 4e13;
+
+/// How a trajectory is written.
+enum Form {
+    Tum,
+    Euroc,
+    Matrices,
+}
+
+impl Form {
+    fn of(file: &TextFile) -> Self {
+        let Some(first) = file.lines().next() else { return Self::Tum };
+        let time = first.fields().next().and_then(|field| field.parse().ok());
+        match first.fields().count() {
+            16 if time.is_none_or(|time| time < LEAST_NANOSECONDS) => Self::Matrices,
+            8.. if time.is_some_and(|time: f64| time >= LEAST_NANOSECONDS) => Self::Euroc,
+            _ => Self::Tum,
+        }
+    }
+}
+
+/// Poses in order of time.
+fn in_order<'a>(
+    poses: impl Iterator<Item = Result<(Line<'a>, TimedPose), FileError>>,
+) -> Result<Vec<TimedPose>, FileError> {
+    let mut previous = None;
+    poses
+        .map(|pose| {
+            let (line, pose) = pose?;
+            line.check_order(pose.timestamp, previous)?;
+            previous = Some(pose.timestamp);
+            Ok(pose)
+        })
+        .collect()
+}
+
+/// Nanoseconds, position, quaternion with w first, and more columns that are not read.
+fn pose_of_euroc(line: &Line<'_>) -> Result<TimedPose, FileError> {
+    const EXPECTED: &str = "nanoseconds, position x y z, quaternion w x y z";
+    let mut fields = line.fields();
+    let mut next = || line.number(fields.next().ok_or_else(|| line.malformed(EXPECTED))?, EXPECTED);
+    let nanoseconds = next()?;
+    let [x, y, z] = [next()?, next()?, next()?];
+    let [qw, qx, qy, qz] = [next()?, next()?, next()?, next()?];
+    let world_from_camera = pose_from_numbers(line, &[x, y, z, qx, qy, qz, qw])?;
+    Ok(TimedPose { timestamp: nanoseconds * 1e-9, world_from_camera })
 }
 
 /// A trajectory that was recorded, lines that are no poses left out.
@@ -258,6 +321,35 @@ mod tests {
         let image = poses[0].world_from_camera.transform_point(&Vector3::x());
         assert!((image - Vector3::new(1.0, 3.0, 3.0)).norm() < 1e-12);
         assert!(poses[1].world_from_camera.rotation.angle() < 1e-12);
+    }
+
+    #[test]
+    fn references_of_euroc_and_replica_are_told_by_their_first_line() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let half = 0.5_f64.sqrt();
+        let row = |time: u64| format!("{time},1,2,3,{half},0,0,{half},0.1,0.2,0.3,0,0,0,0,0,0\n");
+        let header = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], ...\n";
+        fs::write(
+            file.path(),
+            format!("{header}{}{}", row(1_403_636_580_838_555_648), row(1_403_636_580_843_555_648)),
+        )
+        .unwrap();
+        let euroc = read_trajectory(file.path()).unwrap();
+        assert_eq!(euroc[1].timestamp, 1_403_636_580.843_555_7);
+        let matrix = "0 -1 0 1 1 0 0 2 0 0 1 3 0 0 0 1\n";
+        fs::write(file.path(), matrix.repeat(2)).unwrap();
+        let replica = read_trajectory(file.path()).unwrap();
+        assert_eq!((replica.len(), replica[1].timestamp), (2, 1.0 / 30.0));
+        // A quarter turn about z takes x to y in both.
+        for pose in [euroc[0], replica[0]] {
+            let image = pose.world_from_camera.transform_point(&Vector3::x());
+            assert!((image - Vector3::new(1.0, 3.0, 3.0)).norm() < 1e-12, "{image}");
+        }
+        assert!(
+            message(&format!("{matrix}0 -1 0\n"))
+                .starts_with("FILE, line 2: expected the 16 numbers of a 4x4")
+        );
+        assert!(message(&row(1_403_636_580_838_555_648).repeat(2)).contains("line 2: timestamp"));
     }
 
     #[test]

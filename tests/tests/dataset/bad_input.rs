@@ -37,8 +37,8 @@ fn images_of_another_size_or_type_are_errors() {
     let message = folder.shortened(&folder.open().frame(1).unwrap_err());
     assert_eq!(message, "rgb/1.png has 9 x 6 pixels, the calibration says 8 x 6");
     larger.to_luma8().save(folder.path.join("depth/0.png")).unwrap();
-    let expected = "depth/0.png has 9 x 6 pixels, the colour images 8 x 6; depth has to be registered to colour, pixel \
-                    by pixel";
+    let expected = "depth/0.png has 9 x 6 pixels, the colour images 8 x 6; depth of other \
+                    proportions needs its camera as [depth] in calibration.toml";
     assert_eq!(folder.message(), expected);
     colour_image(WIDTH, HEIGHT).to_luma8().save(folder.path.join("depth/0.png")).unwrap();
     let message = folder.shortened(&folder.open().frame(0).unwrap_err());

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod camera_facts;
+mod depth_camera;
 mod folder;
 mod inertial;
 mod other_layouts;

@@ -143,3 +143,34 @@ fn scannet_frames_without_pose_or_partner_are_reported() {
         folder.message().starts_with("intrinsic/intrinsic_depth.txt, line 1: expected four lines of four")
     );
 }
+
+#[test]
+fn bonn_is_known_and_eth3d_brings_its_camera() {
+    let folder = Folder::named("rgbd_bonn_crowd");
+    let list = |kind: &str| format!("1548266470.88 {kind}/0.png\n1548266470.91 {kind}/1.png\n");
+    folder.write("rgb.txt", &list("rgb"));
+    folder.write("depth.txt", &list("depth"));
+    let camera = folder.open().calibration().camera;
+    assert_eq!((camera.width, camera.fx), (640, 542.822841));
+
+    let folder = Folder::named("plant_1");
+    for k in 0..2 {
+        folder.colour(&format!("rgb/{k}.png"));
+        folder.depth(&format!("depth/{k}.png"), 100);
+    }
+    folder.write("rgb.txt", &list("rgb"));
+    folder.write("depth.txt", &list("depth"));
+    folder.write("calibration.txt", "7.0 7.5 3.5 2.5\n");
+    let dataset = folder.open();
+    let calibration = dataset.calibration();
+    assert_eq!((calibration.camera.width as u32, calibration.camera.fy), (WIDTH, 7.5));
+    assert_eq!((calibration.depth_scale, calibration.sources.readout.name()), (5000.0, "recorded"));
+    assert_eq!(dataset.frame(1).unwrap().depth[0], 100);
+    // EuRoC's truth stands in for groundtruth.txt.
+    fs::create_dir(folder.path.join("state_groundtruth_estimate0")).unwrap();
+    folder.write("state_groundtruth_estimate0/data.csv", "1548266470880000000,1,2,3,1,0,0,0\n");
+    let poses = folder.open().ground_truth().to_vec();
+    assert_eq!((poses.len(), poses[0].world_from_camera.translation), (1, Vector3::new(1.0, 2.0, 3.0)));
+    folder.write("calibration.txt", "7.0 -7.5 3.5 2.5\n");
+    assert!(folder.message().starts_with("calibration.txt, line 1: fy = -7.5, expected a focal length"));
+}

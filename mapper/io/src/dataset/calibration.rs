@@ -1,12 +1,12 @@
 //! What has to be known about the camera, and checks that it makes sense.
 
-use std::fmt::Display;
-
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use mba_tracker::photometric::{InverseResponse, Vignetting};
-use nalgebra::{Matrix3, Rotation3};
+use nalgebra::Rotation3;
 
+use super::depth_camera::DepthCamera;
 use super::knowledge::{CalibrationSources, CameraFact, Knowledge};
+use super::validity::{InvalidValue, ROTATION, check_camera, check_positive, invalid, is_rotation};
 
 /// Everything known about the camera of a data set.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,6 +15,9 @@ pub struct Calibration {
     pub camera: PinholeCamera,
     /// Distortion of the stored images; it is removed on reading.
     pub distortion: Distortion,
+    /// The camera of the stored depth images. Without it they are registered to colour pixel by pixel, or show the same
+    /// view with larger or smaller pixels.
+    pub depth_camera: Option<DepthCamera>,
     /// Raw depth units per metre, positive.
     pub depth_scale: f64,
     /// Where the exposure times come from.
@@ -127,27 +130,6 @@ impl Shutter {
     }
 }
 
-/// A value outside its valid range.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{key} is {value}, expected {expected}")]
-pub struct InvalidValue {
-    /// What has the value.
-    pub key: &'static str,
-    /// The value.
-    pub value: String,
-    /// What it should be.
-    pub expected: &'static str,
-}
-
-/// Largest plausible focal length in image widths: narrower than 0.6 degrees of view.
-const MAX_FOCAL_IN_WIDTHS: f64 = 100.0;
-
-/// Largest plausible image side in pixels, so that absurd sizes do not ask for absurd memory.
-const MAX_SIDE: usize = 16_384;
-
-/// Most pixels of an image: eight times those of the largest depth cameras.
-pub(crate) const MAX_PIXELS: usize = 64_000_000;
-
 /// Most raw units of depth per metre: 16 bits then reach to 6 cm.
 const MAX_DEPTH_SCALE: f64 = 1e6;
 
@@ -166,7 +148,8 @@ const EXPOSURES: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
 impl Calibration {
     /// A camera of which nothing is known but its geometry, depth scale and frame rate: exposure and response are
     /// assumed, the shutter is taken for global, and nothing falls off or comes late.
-    pub(super) fn of_geometry(
+    #[must_use]
+    pub fn of_geometry(
         camera: PinholeCamera,
         distortion: Distortion,
         depth_scale: f64,
@@ -175,6 +158,7 @@ impl Calibration {
         Self {
             camera,
             distortion,
+            depth_camera: None,
             depth_scale,
             exposure: ExposureSource::Assumed { seconds: assumed_exposure_seconds(frame_rate) },
             frame_rate,
@@ -255,6 +239,7 @@ impl Calibration {
             return Err(invalid("distortion", bad, "finite numbers"));
         }
         self.check_lens()?;
+        self.depth_camera.iter().try_for_each(DepthCamera::check)?;
         // Written so that NaN is refused.
         if !(self.depth_scale > 1.0 && self.depth_scale <= MAX_DEPTH_SCALE) {
             let expected = "a positive number of raw units per metre, above 1 and at most 1000000 (millimetres are 1000)";
@@ -343,38 +328,6 @@ impl Calibration {
     }
 }
 
-/// What the nine numbers of a rotation must be.
-pub(super) const ROTATION: &str =
-    "the 9 numbers of a rotation, row by row, columns orthogonal and of length 1";
-
-/// Largest element of `R R^T - I` of a rotation that is kept as it is.
-const ROUNDING: f64 = 1e-12;
-
-/// Whether the matrix is finite, orthonormal to rounding and right-handed.
-fn is_rotation(rotation: &Rotation3<f64>) -> bool {
-    let matrix = rotation.matrix();
-    let deviation = matrix * matrix.transpose() - Matrix3::identity();
-    // Written so that NaN is refused.
-    deviation.iter().all(|element| element.abs() <= ROUNDING) && matrix.determinant() > 0.0
-}
-
-/// The rotation of nine numbers, row by row, that may be rounded to two decimals; none if they are no rotation.
-pub(super) fn rotation_of(rows: &[f64; 9]) -> Option<Rotation3<f64>> {
-    let exact = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(rows));
-    if is_rotation(&exact) {
-        return Some(exact);
-    }
-    let matrix = exact.matrix();
-    let deviation = matrix * matrix.transpose() - Matrix3::identity();
-    let is_near = deviation.iter().all(|element| element.abs() <= 0.02) && matrix.determinant() > 0.0;
-    if !is_near {
-        return None;
-    }
-    // The nearest rotation: the singular values, all near 1, become 1.
-    let parts = matrix.svd(true, true);
-    Some(Rotation3::from_matrix_unchecked(parts.u? * parts.v_t?))
-}
-
 /// Checks an exposure time.
 pub(super) fn check_exposure(seconds: f64) -> Result<(), InvalidValue> {
     if EXPOSURES.contains(&seconds) {
@@ -382,51 +335,3 @@ pub(super) fn check_exposure(seconds: f64) -> Result<(), InvalidValue> {
     }
     Err(invalid("exposure_seconds", seconds, "a positive number of seconds, 0.000001 to 1 (16 ms are 0.016)"))
 }
-
-/// Checks size, focal lengths and principal point.
-pub fn check_camera(camera: &PinholeCamera) -> Result<(), InvalidValue> {
-    for (key, side) in [("width", camera.width), ("height", camera.height)] {
-        if side == 0 || side > MAX_SIDE {
-            return Err(invalid(key, side, "a size from 1 to 16384 pixels"));
-        }
-    }
-    if camera.width * camera.height > MAX_PIXELS {
-        return Err(invalid("width", camera.width, "a size of at most 64 million pixels"));
-    }
-    // The comparisons are written so that NaN is refused.
-    let (width, height) = (camera.width as f64, camera.height as f64);
-    for (key, focal) in [("fx", camera.fx), ("fy", camera.fy)] {
-        if !(focal > 1.0 && focal <= MAX_FOCAL_IN_WIDTHS * width) {
-            return Err(invalid(
-                key,
-                focal,
-                "a focal length in pixels, above 1 and at most 100 image widths",
-            ));
-        }
-    }
-    for (key, centre, side) in [("cx", camera.cx, width), ("cy", camera.cy, height)] {
-        if !(centre >= -side && centre <= 2.0 * side) {
-            return Err(invalid(key, centre, "a principal point in pixels, in or near the image"));
-        }
-    }
-    Ok(())
-}
-
-/// Checks that `value` is finite and above zero.
-pub fn check_positive(key: &'static str, value: f64, expected: &'static str) -> Result<(), InvalidValue> {
-    if value.is_finite() && value > 0.0 { Ok(()) } else { Err(invalid(key, value, expected)) }
-}
-
-fn invalid(key: &'static str, value: impl Display, expected: &'static str) -> InvalidValue {
-    let mut value = value.to_string();
-    // Numbers of hundreds of digits are read best with an exponent.
-    if value.len() > LONGEST_VALUE
-        && let Ok(number) = value.parse::<f64>()
-    {
-        value = format!("{number:e}");
-    }
-    InvalidValue { key, value, expected }
-}
-
-/// Characters of a number that is shown digit by digit.
-const LONGEST_VALUE: usize = 24;

@@ -7,7 +7,8 @@ use mba_tracker::geometry::{Distortion, PinholeCamera};
 use nalgebra::Rotation3;
 use serde::Deserialize;
 
-use super::calibration::{InvalidValue, ROTATION, rotation_of};
+use super::depth_camera::DepthKeys;
+use super::validity::{InvalidValue, ROTATION, rotation_of};
 use super::{
     Calibration, CalibrationSources, CameraFact, DatasetError, ExposureSource, Knowledge, Response, Shutter,
     Vignetting, Warning, response_table,
@@ -40,6 +41,7 @@ struct Keys {
     vignetting: Option<[f64; 2]>,
     imu_from_camera: Option<RotationKey>,
     estimated: Option<Vec<CameraFact>>,
+    depth: Option<DepthKeys>,
 }
 
 #[derive(Deserialize)]
@@ -80,12 +82,16 @@ pub(super) fn read(
 
 /// The value with the line that sets its key.
 pub(super) fn invalid_value(path: &Path, text: &str, invalid: InvalidValue) -> DatasetError {
-    let sets_key = |line: &str| {
-        line.trim_start().trim_start_matches('"').split([' ', '=', '"']).next() == Some(invalid.key)
-    };
+    // The section of a key comes before it.
+    let (section, key) = invalid.key.split_once('.').map_or((0, invalid.key), |(section, key)| {
+        let opens = |line: &str| line.trim() == format!("[{section}]");
+        (text.lines().position(opens).unwrap_or(0), key)
+    });
+    let sets_key =
+        |line: &str| line.trim_start().trim_start_matches('"').split([' ', '=', '"']).next() == Some(key);
     DatasetError::CalibrationValue {
         path: path.to_owned(),
-        line: text.lines().position(sets_key).map_or(1, |index| index + 1),
+        line: text.lines().skip(section).position(sets_key).map_or(1, |index| section + index + 1),
         key: invalid.key,
         value: invalid.value,
         expected: invalid.expected,
@@ -117,6 +123,7 @@ fn calibration(
     if let Some(seconds) = keys.exposure_seconds {
         calibration.exposure = ExposureSource::Constant { seconds };
     }
+    calibration.depth_camera = keys.depth.as_ref().map(DepthKeys::camera).transpose().map_err(located)?;
     calibration.readout = readout(&keys, warnings).map_err(located)?;
     calibration.response = response(path, text, keys.response, warnings)?;
     calibration.depth_readout_seconds = keys.depth_readout_seconds.unwrap_or(0.0);

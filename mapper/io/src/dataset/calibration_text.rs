@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 
+use super::depth_camera::section;
 use super::{
     Calibration, CalibrationSources, CameraFact, ExposureSource, Knowledge, Response, Shutter, Vignetting,
     response_table,
@@ -37,6 +38,8 @@ pub fn write_calibration(path: &Path, calibration: &Calibration) -> Result<(), F
     text.light(calibration, response);
     text.times(calibration);
     text.estimated(&calibration.sources);
+    // A section ends where the next one begins: it comes last.
+    text.0.extend(calibration.depth_camera.as_ref().map(section));
     files.push((path.to_owned(), text.0));
     write_together(&files)
 }
@@ -117,7 +120,7 @@ mod tests {
     use mba_tracker::photometric::InverseResponse;
     use nalgebra::{Rotation3, Vector3};
 
-    use super::super::read_calibration;
+    use super::super::{DepthCamera, read_calibration};
     use super::*;
 
     fn written_and_read(calibration: &Calibration) -> Calibration {
@@ -163,6 +166,7 @@ mod tests {
         assert_eq!(written_and_read(&calibration), calibration);
         calibration.readout = Shutter::Global;
         calibration.response = Response::Linear;
+        calibration.depth_camera = Some(DepthCamera::same_view(&calibration.camera, (160, 120)));
         (calibration.depth_delay_seconds, calibration.depth_clock_seconds) = (None, -0.0207);
         calibration.sources.readout = Knowledge::Recorded;
         assert_eq!(written_and_read(&calibration), calibration);

@@ -110,9 +110,10 @@ pub enum DatasetError {
         /// How many of that unit are a second.
         per_second: u64,
     },
-    /// The first depth image does not have the size of the colour images, which is that of the calibration.
+    /// The first depth image does not have the proportions of the colour images, and its camera is not in the calibration.
     #[error(
-        "{path} has {} x {} pixels, the colour images {} x {}; depth has to be registered to colour, pixel by pixel",
+        "{path} has {} x {} pixels, the colour images {} x {}; depth of other proportions needs its camera as [depth] \
+         in calibration.toml",
         .found.0, .found.1, .expected.0, .expected.1
     )]
     DepthSize {

@@ -51,13 +51,23 @@ pub(super) fn read_colour(path: &Path, size: (usize, usize)) -> Result<Vec<u8>, 
     Ok(decode(path, size, |_| Ok(()))?.into_rgb8().into_raw())
 }
 
-/// Decodes a 16-bit depth image of `size` (width, height).
+/// Largest raw depth: many cameras write it where they have none.
+const SATURATED: u16 = u16::MAX;
+
+/// Decodes a 16-bit depth image of `size` (width, height); saturated values are missing ones.
 pub(super) fn read_depth(path: &Path, size: (usize, usize)) -> Result<Vec<u16>, FrameReadError> {
     let check = |colour_type| match colour_type {
         ColorType::L16 => Ok(()),
         other => Err(FrameReadError::DepthFormat { path: path.to_owned(), found: format!("{other:?}") }),
     };
-    Ok(decode(path, size, check)?.into_luma16().into_raw())
+    let mut depth = decode(path, size, check)?.into_luma16().into_raw();
+    depth.iter_mut().filter(|depth| **depth == SATURATED).for_each(|depth| *depth = 0);
+    Ok(depth)
+}
+
+/// Decodes an image of `size` (width, height) into one 8-bit value per pixel.
+pub(super) fn read_grey(path: &Path, size: (usize, usize)) -> Result<Vec<u8>, FrameReadError> {
+    Ok(decode(path, size, |_| Ok(()))?.into_luma8().into_raw())
 }
 
 /// What the header of an image says.

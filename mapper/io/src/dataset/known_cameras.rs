@@ -36,6 +36,26 @@ pub(super) fn tum_camera(folder: &Path, first: f64) -> Option<KnownCamera> {
     (1..=3).find(|number| named(*number)).map(freiburg)
 }
 
+/// When the sequences of Bonn were recorded, seconds since 1970: 2018 and 2019.
+const RECORDED_IN_BONN: Range<f64> = 1.51e9..1.58e9;
+
+/// Camera of the Bonn RGB-D dynamic dataset (Palazzolo et al., IROS 2019), recognised as [`tum_camera`] is.
+pub(super) fn bonn_camera(folder: &Path, first: f64) -> Option<KnownCamera> {
+    let is_bonn = folder.file_name()?.to_string_lossy().to_lowercase().contains("rgbd_bonn");
+    (is_bonn && RECORDED_IN_BONN.contains(&first)).then(|| KnownCamera {
+        name: "the Bonn RGB-D dynamic dataset",
+        camera: PinholeCamera {
+            width: 640,
+            height: 480,
+            fx: 542.822_841,
+            fy: 542.576_870,
+            cx: 315.593_520,
+            cy: 237.756_098,
+        },
+        distortion: Distortion { k1: 0.039_903, k2: -0.099_343, p1: -0.000_730, p2: -0.000_144, k3: 0.0 },
+    })
+}
+
 fn freiburg(number: u32) -> KnownCamera {
     let (name, [fx, fy, cx, cy], [k1, k2, p1, p2, k3]) = match number {
         1 => (

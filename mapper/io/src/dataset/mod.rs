@@ -1,7 +1,7 @@
 //! Recorded RGB-D sequences: which layout a folder has, what its camera is, and its frames one by one.
 //!
 //! The native layout is that of the TUM RGB-D benchmark plus a `calibration.toml`; the sequences of that
-//! benchmark, Replica as rendered for NICE-SLAM and ScanNet exports are read as they are. Timestamps are those of
+//! benchmark, of Bonn and of ETH3D, Replica as rendered for NICE-SLAM and ScanNet exports are read as they are. Timestamps are those of
 //! mid exposure of the middle of the image; depth images have their own. Poses are `world_from_camera`.
 //!
 //! ```no_run
@@ -19,21 +19,26 @@ mod association;
 mod calibration;
 mod calibration_file;
 mod calibration_text;
+mod depth_camera;
+mod depth_view;
 mod error;
+mod eth3d;
 mod exposure_list;
 mod frame;
+mod image_source;
 mod jpeg_scan;
 mod knowledge;
 mod known_cameras;
 mod numbered_images;
 mod options;
-mod pose_matrix;
 mod replica;
 mod response_table;
 mod scannet;
 mod sequence;
 mod survey;
 mod tum;
+mod usable_depth;
+mod validity;
 mod vignetting;
 
 use std::fs;
@@ -43,13 +48,12 @@ use mba_tracker::photometric::InverseResponse;
 
 use crate::FileError;
 pub use crate::trajectory_file::{TimedExposure, TimedPose};
-pub(crate) use calibration::MAX_PIXELS;
 pub use calibration::{
-    ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, InvalidValue, LONGEST_ASSUMED_EXPOSURE, Response,
-    Shutter, assumed_exposure_seconds,
+    ASSUMED_EXPOSURE_SHARE, Calibration, ExposureSource, LONGEST_ASSUMED_EXPOSURE, Response, Shutter,
+    assumed_exposure_seconds,
 };
-pub use calibration::{check_camera, check_positive};
 pub use calibration_text::write_calibration;
+pub use depth_camera::DepthCamera;
 pub use error::{DatasetError, FrameReadError, Warning};
 pub use exposure_list::{read_exposure_times, write_exposure_times};
 pub use frame::RgbdFrame;
@@ -60,6 +64,8 @@ pub use options::OpenOptions;
 pub use response_table::to_text as response_text;
 pub use sequence::Dataset;
 pub use survey::{Survey, survey};
+pub(crate) use validity::MAX_PIXELS;
+pub use validity::{InvalidValue, check_camera, check_positive};
 
 /// Opens the data set in `folder` with default options: recognises the layout, reads lists, calibration and
 /// ground truth, but no images.

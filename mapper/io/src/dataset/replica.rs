@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use serde::Deserialize;
 
-use super::calibration::InvalidValue;
 use super::numbered_images::{self, ImageFolder};
-use super::pose_matrix::pose_from_rows;
 use super::sequence::{Contents, FrameEntry};
+use super::validity::InvalidValue;
 use super::{Calibration, DatasetError, Knowledge, TimedPose, Warning, calibration_file};
 use crate::FileError;
+use crate::pose_matrix::pose_from_rows;
 use crate::text_lines::TextFile;
 use crate::whole_file::read_text;
 

@@ -7,13 +7,13 @@ use std::path::Path;
 
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 
-use super::calibration::{InvalidValue, check_camera};
 use super::frame::header;
 use super::numbered_images::{self, ImageFolder};
-use super::pose_matrix::pose_from_rows;
 use super::sequence::{Contents, FrameEntry};
+use super::validity::{InvalidValue, check_camera};
 use super::{Calibration, DatasetError, TimedPose, Warning};
 use crate::FileError;
+use crate::pose_matrix::pose_from_rows;
 use crate::text_lines::TextFile;
 
 const FOLDERS: [&str; 4] = ["color", "depth", "pose", "intrinsic"];

@@ -1,22 +1,21 @@
 //! An opened data set: a list of frames that are decoded on demand.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use mba_tracker::geometry::PinholeCamera;
-use mba_tracker::image::{
-    PixelRectangle, SourcePosition, fill_source_map, region_with_source, remap_bilinear, remap_nearest,
-};
+use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::{Vignetting, radius_squared};
 
 use super::calibration::{
     ASSUMED_EXPOSURE_SHARE, LONGEST_ASSUMED_EXPOSURE, assumed_exposure_seconds, check_exposure,
 };
 use super::frame::{ImageHeader, header, read_colour, read_depth};
+use super::image_source::{ColourSource, DepthSource, check_is_there, size};
+use super::usable_depth::UsableDepth;
 use super::vignetting::{falloff_of_frames, falloff_of_pixels};
 use super::{
-    Calibration, CameraFact, DatasetError, ExposureSource, FrameReadError, InvalidValue, Knowledge,
-    RgbdFrame, Warning,
+    Calibration, CameraFact, DatasetError, DepthCamera, ExposureSource, FrameReadError, InvalidValue,
+    Knowledge, RgbdFrame, Warning,
 };
 use crate::imu::{self, ImuRecording};
 use crate::trajectory_file::{TimedExposure, TimedPose};
@@ -36,8 +35,9 @@ pub struct Dataset {
     /// Of the reader; those about times follow from calibration and entries.
     reader_warnings: Vec<Warning>,
     warnings: Vec<Warning>,
-    colour: ImageSource,
-    depth: ImageSource,
+    colour: ColourSource,
+    depth: DepthSource,
+    usable: UsableDepth,
     region: PixelRectangle,
 }
 
@@ -65,16 +65,6 @@ pub(super) struct Contents {
     pub(super) warnings: Vec<Warning>,
 }
 
-/// Size of the stored images and, unless they are used as they are, how to resample them.
-#[derive(Clone, Debug)]
-struct ImageSource {
-    size: (usize, usize),
-    map: Option<Vec<SourcePosition>>,
-    /// Whether there was any image when the data set was opened. Without one the size is a mere claim, for which no map is
-    /// made.
-    is_there: bool,
-}
-
 impl Dataset {
     /// Prepares undistortion and checks what can be checked without decoding images.
     pub(super) fn new(folder: &Path, contents: Contents) -> Result<Self, DatasetError> {
@@ -85,17 +75,10 @@ impl Dataset {
         let captured = colour_camera.unwrap_or(camera);
         // Before the maps: their memory follows from sizes that may be wrong.
         let has_colour = check_first_size(entries.iter().map(|entry| &entry.colour), size(&captured))?;
-        let depths = entries.iter().map(|entry| &entry.depth);
-        let has_depth = check_first_size(depths, size(&camera)).map_err(|error| match error {
-            DatasetError::SizeMismatch { path, found, expected } if has_colour => {
-                DatasetError::DepthSize { path, found, expected }
-            }
-            other => other,
-        })?;
-        let colour = ImageSource::new(&calibration, &captured, has_colour);
-        let depth = ImageSource::new(&calibration, &camera, has_depth);
-        let whole = PixelRectangle { left: 0, top: 0, right: camera.width, bottom: camera.height };
-        let region = colour.map.as_ref().map_or(whole, |map| region_with_source(map, camera.width));
+        let (depth_camera, has_depth) = depth_camera(&entries, &calibration, has_colour)?;
+        let colour = ColourSource::new(&calibration, &captured, has_colour);
+        let depth = DepthSource::new(&calibration, depth_camera.as_ref(), has_depth);
+        let region = colour.region(&camera);
         let mut dataset = Self {
             name: folder_name(folder),
             folder: folder.to_owned(),
@@ -109,6 +92,7 @@ impl Dataset {
             warnings: Vec::new(),
             colour,
             depth,
+            usable: UsableDepth::of(folder),
             region,
         };
         dataset.collect_warnings();
@@ -200,6 +184,23 @@ impl Dataset {
         &self.calibration
     }
 
+    /// The camera of the stored colour images: that of the calibration, unless frames are those of another one.
+    #[must_use]
+    pub fn stored_colour_camera(&self) -> PinholeCamera {
+        self.colour_camera.unwrap_or(self.calibration.camera)
+    }
+
+    /// The stored colour and depth image of frame `index`.
+    ///
+    /// # Panics
+    ///
+    /// If `index` is not below [`Self::len`].
+    #[must_use]
+    pub fn image_paths(&self, index: usize) -> [&Path; 2] {
+        let entry = &self.entries[index];
+        [&entry.colour, &entry.depth]
+    }
+
     /// Whether there was any colour and any depth image when the data set was opened. If not, no frame can be read, and
     /// the size in the calibration is a mere claim.
     #[must_use]
@@ -257,10 +258,10 @@ impl Dataset {
     pub fn frame(&self, index: usize) -> Result<RgbdFrame, FrameReadError> {
         let len = self.entries.len();
         let entry = self.entries.get(index).ok_or(FrameReadError::IndexOutOfRange { index, len })?;
-        let rgb = self.colour.undistort_colour(read_colour(&entry.colour, self.colour.size)?);
-        let depth = self.depth.undistort_depth(read_depth(&entry.depth, self.depth.size)?);
-        self.colour.check(&entry.colour)?;
-        self.depth.check(&entry.depth)?;
+        let rgb = self.colour.undistort(read_colour(&entry.colour, self.colour.size)?);
+        let depth = self.frame_depth(entry)?;
+        check_is_there(self.colour.is_there, &entry.colour)?;
+        check_is_there(self.depth.is_there, &entry.depth)?;
         Ok(RgbdFrame {
             index,
             timestamp: entry.timestamp,
@@ -271,6 +272,18 @@ impl Dataset {
             rgb,
             depth,
         })
+    }
+
+    /// The depth of a frame's pixels, as far as it can be used.
+    fn frame_depth(&self, entry: &FrameEntry) -> Result<Vec<u16>, FrameReadError> {
+        let mut stored = read_depth(&entry.depth, self.depth.size)?;
+        self.usable.remove_unsure(&mut stored, &entry.depth, self.depth.size)?;
+        let mut depth = self.depth.seen(stored);
+        if let Some(mask) = self.usable.mask(&entry.colour, self.colour.size)? {
+            let mask = self.colour.undistort_mask(mask);
+            depth.iter_mut().zip(mask).for_each(|(depth, is_used)| *depth *= is_used);
+        }
+        Ok(depth)
     }
 
     /// Recorded poses at mid exposure, increasing in time; empty if there are none. Their times need not be
@@ -359,6 +372,7 @@ impl Dataset {
         self.warn_about_timing();
         self.warn_about_missing_images();
         self.warn_about_orientation();
+        self.warn_about_depth_view();
         self.read_imu();
     }
 
@@ -419,51 +433,21 @@ impl Dataset {
         }
     }
 
+    fn warn_about_depth_view(&mut self) {
+        let camera = &self.calibration.camera;
+        if self.calibration.depth_camera.is_none() && self.depth.size != size(camera) {
+            let pixel = camera.width as f64 / self.depth.size.0 as f64;
+            let value = format!("the view of colour with pixels {pixel} times as wide");
+            self.warnings.push(Warning::Assumed { key: "[depth] of the calibration", value });
+        }
+    }
+
     fn warn_about_missing_images(&mut self) {
         let images = self.entries.iter().flat_map(|entry| [&entry.colour, &entry.depth]);
         let mut missing = images.filter(|path| !path.is_file());
         if let Some(first) = missing.next().cloned() {
             self.warnings.push(Warning::MissingImages { count: 1 + missing.count(), first });
         }
-    }
-}
-
-impl ImageSource {
-    fn new(calibration: &Calibration, captured: &PinholeCamera, is_there: bool) -> Self {
-        let ideal = &calibration.camera;
-        let size = size(captured);
-        if calibration.distortion.is_none() && captured == ideal || !is_there {
-            return Self { size, map: None, is_there };
-        }
-        let mut map = vec![[0.0; 2]; ideal.width * ideal.height];
-        let filled = fill_source_map(ideal, captured, &calibration.distortion, &mut map);
-        Self { size, map: filled.ok().map(|()| map), is_there }
-    }
-
-    /// Refuses images that have come since the data set was opened: there may be no map for them.
-    fn check(&self, path: &Path) -> Result<(), FrameReadError> {
-        if self.is_there || !path.is_file() {
-            return Ok(());
-        }
-        let reason = io::Error::other("no such image could be read when the data set was opened");
-        Err(FrameReadError::Unreadable { path: path.to_owned(), reason })
-    }
-
-    fn undistort_colour(&self, stored: Vec<u8>) -> Vec<u8> {
-        let Some(map) = &self.map else { return stored };
-        let mut target = vec![[0; 3]; map.len()];
-        let (pixels, _) = stored.as_chunks::<3>();
-        let mapped = remap_bilinear(pixels, self.size.0, self.size.1, map, &mut target);
-        debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
-        target.into_flattened()
-    }
-
-    fn undistort_depth(&self, stored: Vec<u16>) -> Vec<u16> {
-        let Some(map) = &self.map else { return stored };
-        let mut target = vec![0; map.len()];
-        let mapped = remap_nearest(&stored, self.size.0, self.size.1, map, &mut target);
-        debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
-        target
     }
 }
 
@@ -501,10 +485,6 @@ fn find_gaps(times: &[f64]) -> Option<Warning> {
     Some(Warning::Gaps { count: gaps.count(), longest, after })
 }
 
-fn size(camera: &PinholeCamera) -> (usize, usize) {
-    (camera.width, camera.height)
-}
-
 /// Compares the first readable image with the calibration, so that a wrong calibration is found before any work; says
 /// whether there is one.
 fn check_first_size<'a>(
@@ -516,6 +496,31 @@ fn check_first_size<'a>(
             Err(DatasetError::SizeMismatch { path: path.clone(), found: found.stored, expected })
         }
         first => Ok(first.is_some()),
+    }
+}
+
+/// The camera of the depth images where it is not that of the calibration, and whether there is any image. One that is not
+/// described is that of colour with pixels of another size, if the images have its proportions.
+fn depth_camera(
+    entries: &[FrameEntry],
+    calibration: &Calibration,
+    has_colour: bool,
+) -> Result<(Option<DepthCamera>, bool), DatasetError> {
+    let depths = || entries.iter().map(|entry| &entry.depth);
+    if let Some(own) = calibration.depth_camera {
+        return Ok((Some(own), check_first_size(depths(), size(&own.camera))?));
+    }
+    let camera = &calibration.camera;
+    match check_first_size(depths(), size(camera)) {
+        Err(DatasetError::SizeMismatch { found, .. })
+            if has_colour && found.0 * camera.height == found.1 * camera.width =>
+        {
+            Ok((Some(DepthCamera::same_view(camera, found)), true))
+        }
+        Err(DatasetError::SizeMismatch { path, found, expected }) if has_colour => {
+            Err(DatasetError::DepthSize { path, found, expected })
+        }
+        has_depth => Ok((None, has_depth?)),
     }
 }
 

@@ -3,18 +3,23 @@
 use std::path::Path;
 
 use super::association::{associate, closest};
-use super::known_cameras::{TUM_DEPTH_SCALE, TUM_FRAME_RATE, tum_camera};
+use super::eth3d;
+use super::known_cameras::{TUM_DEPTH_SCALE, TUM_FRAME_RATE, bonn_camera, tum_camera};
 use super::sequence::{Contents, FrameEntry, frames_per_second};
 use super::{Calibration, DatasetError, OpenOptions, Warning, calibration_file, exposure_list};
 use crate::FileError;
 use crate::text_lines::{Line, TextFile};
 use crate::trajectory_file::{
-    Recorded, TimedExposure, TimedPose, read_recorded_exposures, read_recorded_trajectory,
+    Recorded, TimedExposure, TimedPose, read_recorded_exposures, read_recorded_trajectory, read_trajectory,
 };
 
 const ASSOCIATIONS: &str = "associations.txt";
 const COLOUR_LIST: &str = "rgb.txt";
 const DEPTH_LIST: &str = "depth.txt";
+
+/// Ground truth as EuRoC has it.
+const EUROC_TRUTH: [&str; 2] =
+    ["state_groundtruth_estimate0/data.csv", "mav0/state_groundtruth_estimate0/data.csv"];
 
 /// Frames per second that are taken for a camera's where no frame rate is given. Slower times are in another unit, or those
 /// of a camera whose frame rate has to be given.
@@ -202,8 +207,14 @@ fn read_calibration(
         let measured = frames_per_second(&times).filter(|rate| *rate > SLOWEST_ASSUMED);
         return calibration_file::read(&path, measured, warnings);
     }
+    let eth3d = folder.join(eth3d::FILE_NAME);
+    if eth3d.is_file() {
+        return eth3d::read(&eth3d, entries);
+    }
     let absolute = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-    let known = tum_camera(&absolute, entries.first().map_or(0.0, |entry| entry.timestamp))
+    let first = entries.first().map_or(0.0, |entry| entry.timestamp);
+    let known = tum_camera(&absolute, first)
+        .or_else(|| bonn_camera(&absolute, first))
         .ok_or_else(|| DatasetError::MissingCalibration { folder: folder.to_owned() })?;
     warnings.push(Warning::KnownCamera { camera: known.name });
     let calibration =
@@ -225,8 +236,11 @@ fn read_ground_truth(
     } else {
         Vec::new()
     };
+    let euroc = EUROC_TRUTH.map(|name| folder.join(name)).into_iter().find(|path| path.is_file());
     let poses = if poses_path.is_file() {
         sound(read_recorded_trajectory(&poses_path)?, warnings)
+    } else if let (Some(path), true) = (euroc, exposures.is_empty()) {
+        read_trajectory(&path)?
     } else {
         // Exposures have poses at mid exposure, which are ground truth as well.
         let mid = |e: &TimedExposure| TimedPose { timestamp: e.timestamp, world_from_camera: e.mid };

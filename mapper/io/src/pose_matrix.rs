@@ -11,7 +11,7 @@ use crate::FileError;
 const ROTATION_TOLERANCE: f64 = 1e-2;
 
 /// The pose with the given rows; `path` and `line` (of the first row) only serve the message.
-pub(super) fn pose_from_rows(
+pub(crate) fn pose_from_rows(
     rows: &[f64; 16],
     path: &Path,
     line: usize,

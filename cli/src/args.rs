@@ -1,6 +1,7 @@
 //! The command line.
 
 pub mod export;
+pub mod import;
 pub mod map;
 pub mod slam;
 pub mod surface;
@@ -59,6 +60,8 @@ pub enum Command {
     Demo(Demo),
     /// Render a synthetic, motion-blurred RGB-D data set with exact ground truth
     Synth(synth::Synth),
+    /// Write a recording of another program or camera as a data set
+    Import(import::Import),
     /// Show what a data set holds, lacks and what is odd about it
     Info(Info),
     /// Find what is not on record about the camera from the recording itself

@@ -62,6 +62,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
     match command {
         Command::Demo(args) => commands::demo::run(args, console),
         Command::Synth(args) => commands::synth::run(args, console),
+        Command::Import(args) => commands::import::run(args, console),
         Command::Info(args) => commands::info::run(args, console),
         Command::Calibrate(args) => commands::calibrate::run(args, console),
         Command::Track(args) => commands::track::run(args, console),

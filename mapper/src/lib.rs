@@ -1,6 +1,6 @@
 //! Data sets, synthetic sequences, evaluation and offline refinement for motion-blur-aware RGB-D SLAM.
 //!
-//! A [`dataset`], recorded or made by [`synth`], is tracked by [`tracking`] into a [`run`]: poses of every frame at
+//! A [`dataset`], recorded or made by [`synth`], or brought in from another layout by [`import`], is tracked by [`tracking`] into a [`run`]: poses of every frame at
 //! opening, middle and closing of the shutter, and keyframes that [`deblurring`] inverts.
 //!
 //! What is not on record about the camera is found by [`self_calibration`], which tracks again and again.
@@ -20,6 +20,7 @@
 pub use mba_adjust::{bundle, continuity, deblurring, places, pose_graph};
 pub use mba_eval::{evaluation, image_folders};
 pub use mba_field::triplane;
+pub use mba_import as import;
 pub use mba_io::{
     BinaryFileError, FileError, checkpoint, dataset, imu, mesh, output, statistics, trajectory_file,
 };

@@ -9,6 +9,7 @@ pub mod eval_images;
 pub mod eval_mesh;
 pub mod eval_trajectory;
 pub mod export;
+pub mod import;
 pub mod info;
 pub mod map;
 pub mod mesh;

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use mba_mapper::dataset::{self, Dataset, DatasetError};
+use mba_mapper::import::Source;
 use mba_mapper::map::{FIELD_FILE, MAP_FILE, StoredMap};
 use mba_mapper::run::{Run, RunError, path_of};
 use mba_mapper::self_calibration::read_back;
@@ -16,7 +17,19 @@ use crate::failure::{OrBadInput, bad_input};
 /// # Errors
 /// Bad input with advice.
 pub fn dataset(folder: &Path) -> anyhow::Result<Dataset> {
-    dataset::open(folder).map_err(|error| (dataset_hint(&error), error)).or_else(advise)
+    dataset::open(folder).map_err(|error| (import_hint(folder, &error), error)).or_else(advise)
+}
+
+/// What to do about something that is no data set but may become one, or else about a data set that cannot be used.
+fn import_hint(path: &Path, error: &DatasetError) -> Cow<'static, str> {
+    let may_be_recording = matches!(error, DatasetError::UnknownLayout { .. }) || path.is_file();
+    match Source::recognise(path) {
+        Ok(source) if may_be_recording => {
+            format!("`mba import {} --out data` makes a data set of it ({})", path.display(), source.kind())
+                .into()
+        }
+        _ => dataset_hint(error),
+    }
 }
 
 /// Opens a RUN folder.

@@ -11,6 +11,7 @@ mod images;
 mod numbers;
 mod picture;
 mod place;
+mod recordings;
 mod runs;
 mod session;
 
@@ -19,6 +20,7 @@ pub use c_interface::c_interface;
 pub use checkpoints::{checkpoint, resume_map, resume_slam, resume_track};
 pub use data_sets::{calibration, exposure_times, ground_truth, inertial, lists, replica, response, scannet};
 pub use images::{image, image_of_any_size};
+pub use recordings::recording;
 pub use runs::{run, trajectories};
 pub use session::session;
 
@@ -26,7 +28,7 @@ pub use session::session;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 21] = [
+pub const TARGETS: [Target; 22] = [
     ("c_interface", c_interface),
     ("calibration", calibration),
     ("checkpoint", checkpoint),
@@ -39,6 +41,7 @@ pub const TARGETS: [Target; 21] = [
     ("inertial", inertial),
     ("lists", lists),
     ("mesh", mesh),
+    ("recording", recording),
     ("replica", replica),
     ("response", response),
     ("resume_map", resume_map),

@@ -29,6 +29,7 @@ Examples:
   mba synth --out data
   mba synth --out hard --scene hall --blur 24 --exposure 0.028 --frames 60 --seed 7
   mba synth --out round --path loop --frames 240 --size 320x240 --blur 6
+  mba synth --out flat --path walk --frames 2000 --size 320x240 --blur 6
   mba synth --out clean --response linear --noise off --depth exact
   mba synth --out telephone --readout 0.02 --depth-delay 0.011 --auto-exposure --vignetting=-0.35,0.05 --imu \
 --nothing-on-record
@@ -114,6 +115,7 @@ impl Synth {
             motion: match self.path {
                 PathName::Shake => CameraMotion::Sweep,
                 PathName::Loop => CameraMotion::Loop,
+                PathName::Walk => CameraMotion::Walk,
             },
             frames: self.frames,
             width: self.size.0,
@@ -151,6 +153,8 @@ pub enum PathName {
     Shake,
     /// Once round the scene, within all frames, and back to where it began
     Loop,
+    /// Through a row of rooms and back, a round in each, for as long as there are frames; of the room only
+    Walk,
 }
 
 /// Values of `--response`.

@@ -131,6 +131,10 @@ pub enum CameraMotion {
     /// half way there is nothing in view that the first one sees. The shake comes on top, so the blur asked for
     /// cannot be less than that of the way alone.
     Loop,
+    /// Through a row of rooms, for as long as there are frames: once round a room, through a door and round the next one, back
+    /// and round the first one again, and so on one room further. A round takes 7 to 10 seconds, a way between two rooms 6. Of
+    /// the scenes only the room has doors.
+    Walk,
 }
 
 /// How the stored 8-bit values follow from light.
@@ -208,6 +212,9 @@ impl SynthConfig {
             ("full well", well, 1.0..=1e9, "1 to 1e9 electrons"),
             ("read noise", read, 0.0..=1e9, "0 to 1e9 electrons"),
         ];
+        if self.motion == CameraMotion::Walk && self.scene != SceneName::Room {
+            return Err(SynthError::NoDoors { scene: self.scene.name() });
+        }
         self.check_sensor()?;
         self.check_events()?;
         match checks.into_iter().find(|(_, value, range, _)| !range.contains(value)) {

@@ -90,6 +90,7 @@ pub(super) fn readme(sequence: &SynthSequence, summary: &SynthSummary) -> String
     };
     let way = match config.motion {
         CameraMotion::Sweep => "",
+        CameraMotion::Walk => "The camera walks through a row of rooms, with a round in each.\n",
         CameraMotion::Loop => {
             "The camera goes once round the scene; it ends near the place and heading of its start.\n"
         }

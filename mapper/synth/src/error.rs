@@ -26,6 +26,12 @@ pub enum SynthError {
         /// The name asked for.
         name: String,
     },
+    /// A walk from room to room in a scene that has none.
+    #[error("the scene {scene} has no doors to walk through; the room has")]
+    NoDoors {
+        /// Its name.
+        scene: &'static str,
+    },
     /// A text that names no frames.
     #[error("\"{text}\" are no frames; ranges such as 10-15,20 are needed")]
     FrameRanges {

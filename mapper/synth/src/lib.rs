@@ -45,6 +45,7 @@ mod surface;
 mod timing;
 mod truth;
 mod view;
+mod walk;
 mod writer;
 
 pub use blur::BlurFigure;

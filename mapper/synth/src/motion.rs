@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use super::heading::upright_camera;
 use super::random::{Purpose, RowRandom};
 use super::round::Round;
+use super::walk::Walk;
 
 /// A smooth to and fro over a scene that comes by the same places again. Metres, radians, seconds.
 #[derive(Clone, Copy)]
@@ -89,6 +90,8 @@ pub(super) enum Steady {
     Sweep(Sweep),
     /// A whole round from time `begin` on within `duration` seconds.
     Round { round: Round, begin: f64, duration: f64 },
+    /// From room to room.
+    Walk(Walk),
 }
 
 impl Steady {
@@ -96,6 +99,7 @@ impl Steady {
         match self {
             Self::Sweep(sweep) => sweep.pose(time * strength.min(1.0)),
             Self::Round { round, begin, duration } => round.pose((time - begin) / duration),
+            Self::Walk(walk) => walk.pose(time),
         }
     }
 }

@@ -12,6 +12,7 @@ use super::motion::{CameraPath, Steady};
 use super::render::{self, DepthSample, Size, SubFrame, TURNED_GRID};
 use super::scene::Scene;
 use super::view::View;
+use super::walk::Walk;
 use super::{CameraMotion, SynthConfig, SynthError, auto_exposure, timing};
 
 /// Fewest sub-frames of a blurred image.
@@ -80,7 +81,10 @@ impl SynthSequence {
     /// [`SynthError::Setting`] for a number out of range, [`SynthError::BlurOutOfReach`].
     pub fn new(config: SynthConfig) -> Result<Self, SynthError> {
         config.check()?;
-        let scene = Scene::new(config.scene, config.motion);
+        let scene = match config.motion {
+            CameraMotion::Walk => Scene::rooms(Walk::rooms(config.frames as f64 / config.frame_rate)),
+            motion => Scene::new(config.scene, motion),
+        };
         let camera = config.camera();
         let path = CameraPath::new(steady(&config, &scene), config.seed);
         let exposures_along = |path: &CameraPath| auto_exposure::exposures(&config, &scene, &camera, path);
@@ -322,7 +326,7 @@ impl SynthSequence {
     }
 }
 
-/// The way without shake; a round lasts from the first frame to the last.
+/// The way without shake; a round lasts from the first frame to the last, a walk goes on for as long as there are frames.
 fn steady(config: &SynthConfig, scene: &Scene) -> Steady {
     match config.motion {
         CameraMotion::Sweep => Steady::Sweep(scene.sweep),
@@ -331,5 +335,6 @@ fn steady(config: &SynthConfig, scene: &Scene) -> Steady {
             begin: timing::FIRST_TIMESTAMP,
             duration: (config.frames - 1).max(1) as f64 / config.frame_rate,
         },
+        CameraMotion::Walk => Steady::Walk(Walk { begin: timing::FIRST_TIMESTAMP }),
     }
 }

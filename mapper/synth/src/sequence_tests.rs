@@ -269,6 +269,30 @@ fn a_loop_ends_where_it_began_and_sees_nothing_of_that_half_way() {
 }
 
 #[test]
+fn a_walk_comes_back_to_its_first_room_and_sees_another_one_in_between() {
+    let config = SynthConfig {
+        motion: CameraMotion::Walk,
+        frames: 700,
+        frame_rate: 20.0,
+        mean_blur_px: 3.0,
+        ..small()
+    };
+    let walk = sequence(config.clone());
+    // Seven metres from room to room.
+    let room = |frame: usize| {
+        let time = walk.timestamp(frame);
+        (walk.world_from_camera(time).translation.x / 7.0).round()
+    };
+    assert_eq!([0, 120, 300, 420, 690].map(room), [0.0, 0.0, 1.0, 1.0, 0.0]);
+    for frame in (0..690).step_by(30) {
+        let (next, _) = shared_and_near(&walk, frame, frame + 1);
+        assert!(next > 0.4, "frame {frame}: {next} shared");
+    }
+    let error = SynthSequence::new(SynthConfig { scene: SceneName::Hall, ..config }).err().unwrap();
+    assert_eq!(error.to_string(), "the scene hall has no doors to walk through; the room has");
+}
+
+#[test]
 fn a_loop_cannot_have_less_blur_than_its_way() {
     let hasty = SynthConfig { motion: CameraMotion::Loop, frames: 30, mean_blur_px: 0.5, ..small() };
     let error = SynthSequence::new(hasty.clone()).err().unwrap();

@@ -76,6 +76,32 @@ pub(super) enum Material {
 }
 
 impl Material {
+    /// The same kind of look with other colours and prints; number 0 is the look itself.
+    pub(super) fn varied(self, number: u32) -> Self {
+        let dye = |colour: Vec3| match number % 3 {
+            0 => colour,
+            1 => Vec3::new(colour.y, colour.z, colour.x),
+            _ => Vec3::new(colour.z, colour.x, colour.y),
+        };
+        let seed = |seed: u32| seed + 1000 * number;
+        match self {
+            Self::Plaster { colour, stain } => Self::Plaster { colour: dye(colour), stain },
+            Self::Bricks { brick, mortar } => Self::Bricks { brick: dye(brick), mortar: dye(mortar) },
+            Self::Wood { colour, plank } => Self::Wood { colour: dye(colour), plank },
+            Self::Carpet { base, figure } => Self::Carpet { base: dye(base), figure: dye(figure) },
+            Self::Tiles { a, b, size } => Self::Tiles { a: dye(a), b: dye(b), size },
+            Self::Wallpaper { base, figure } => Self::Wallpaper { base: dye(base), figure: dye(figure) },
+            Self::Poster { half, seed: print } => Self::Poster { half, seed: seed(print) },
+            Self::Cardboard { half, seed: print } => Self::Cardboard { half, seed: seed(print) },
+            Self::Spine { colour, half, seed: print } => {
+                Self::Spine { colour: dye(colour), half, seed: seed(print) }
+            }
+            Self::Marble { base, vein } => Self::Marble { base: dye(base), vein: dye(vein) },
+            Self::Rings { a, b, width } => Self::Rings { a: dye(a), b: dye(b), width },
+            Self::Page { .. } | Self::Foliage => self,
+        }
+    }
+
     /// Colour at `uv` on the face across `axis` where a pixel covers `pixel` metres.
     pub(super) fn colour(&self, uv: Vec2, axis: usize, pixel: f32) -> Vec3 {
         match *self {

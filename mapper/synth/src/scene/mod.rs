@@ -8,6 +8,7 @@ mod print;
 mod room;
 mod room_behind;
 mod room_furniture;
+mod rooms;
 mod shape;
 mod wall;
 mod world;
@@ -25,5 +26,10 @@ impl Scene {
             SceneName::Hall => hall::build(motion),
             SceneName::Wall => wall::build(),
         }
+    }
+
+    /// A row of `count` furnished rooms with doors between them.
+    pub(super) fn rooms(count: usize) -> Self {
+        rooms::build(count)
     }
 }

@@ -14,6 +14,16 @@ use crate::motion::Sweep;
 use crate::round::Round;
 
 pub(super) fn build(motion: CameraMotion) -> Scene {
+    let mut things = furniture();
+    if motion == CameraMotion::Loop {
+        things.extend(room_behind::furniture());
+    }
+    let lighting = lighting(&things);
+    Scene::assemble(walls(), things, lighting, sweep(), round())
+}
+
+/// What stands in the far half and hangs on all walls.
+pub(super) fn furniture() -> Vec<Thing> {
     let mut things = pictures();
     things.extend(desk());
     things.extend(bookshelf());
@@ -21,10 +31,12 @@ pub(super) fn build(motion: CameraMotion) -> Scene {
     things.extend(cartons());
     things.extend(armchair());
     things.extend(standing());
-    if motion == CameraMotion::Loop {
-        things.extend(room_behind::furniture());
-    }
-    let lighting = Lighting {
+    things
+}
+
+/// The lamps of the room, and the shadows of what stands in it.
+pub(super) fn lighting(things: &[Thing]) -> Lighting {
+    Lighting {
         // Light of the sky from above, of the floor from below; a lamp at the ceiling, a window, a floor lamp.
         from_above: Vec3::new(0.30, 0.31, 0.33),
         from_below: Vec3::new(0.17, 0.15, 0.13),
@@ -33,12 +45,11 @@ pub(super) fn build(motion: CameraMotion) -> Scene {
             Lamp { position: Vec3::new(3.2, 1.9, -1.2), colour: Vec3::new(0.42, 0.5, 0.62), reach: 3.0 },
             Lamp { position: Vec3::new(-2.9, 1.7, 2.3), colour: Vec3::new(0.5, 0.36, 0.2), reach: 1.2 },
         ]),
-        shadows: shadows(&things, &[0.74, 0.72]),
-    };
-    Scene::assemble(walls(), things, lighting, sweep(), round())
+        shadows: shadows(things, &[0.74, 0.72]),
+    }
 }
 
-fn walls() -> Enclosure {
+pub(super) fn walls() -> Enclosure {
     let bricks = Material::Bricks { brick: colour(0xb5634a), mortar: colour(0xb9b0a2) };
     let paper = Material::Wallpaper { base: colour(0xcdd8cf), figure: colour(0x5f8f86) };
     let panels = Material::Wood { colour: colour(0xb98e62), plank: 0.16 };
@@ -120,7 +131,7 @@ fn standing() -> Vec<Thing> {
 }
 
 /// Round the middle of the near half, looking at each wall in turn.
-fn round() -> Round {
+pub(super) fn round() -> Round {
     Round {
         centre: Vector3::new(0.1, 1.42, -0.9),
         radii: Vector3::new(1.0, 0.08, 0.6),
@@ -132,7 +143,7 @@ fn round() -> Round {
 }
 
 /// To and fro over the far half of the room from its near half.
-fn sweep() -> Sweep {
+pub(super) fn sweep() -> Sweep {
     Sweep {
         centre: Vector3::new(0.0, 1.42, -1.25),
         sway: Vector3::new(0.62, 0.12, 0.38),

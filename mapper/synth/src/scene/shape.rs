@@ -46,6 +46,17 @@ pub(super) enum Shape {
 }
 
 impl Shape {
+    /// The same shape somewhere else.
+    pub(super) fn shifted(self, by: Vec3) -> Self {
+        match self {
+            Self::Cuboid { centre, half, heading } => Self::Cuboid { centre: centre + by, half, heading },
+            Self::Sphere { centre, radius } => Self::Sphere { centre: centre + by, radius },
+            Self::Column { centre, radius, half_height } => {
+                Self::Column { centre: centre + by, radius, half_height }
+            }
+        }
+    }
+
     /// Smallest positive distance at which the ray enters, or infinity.
     pub(super) fn hit(&self, ray: &Ray) -> f32 {
         match *self {

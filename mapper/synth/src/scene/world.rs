@@ -15,6 +15,8 @@ pub(crate) struct Scene {
     /// Spheres around the things, for culling.
     bounds: Vec<(Vec3, f32)>,
     lighting: Lighting,
+    /// Distance along x after which lamps, shadows and corners are the same again; infinite for a single room.
+    repeat: f32,
     /// The path of a camera that films one side of this world.
     pub(crate) sweep: Sweep,
     /// The path of one that films it all round.
@@ -62,7 +64,12 @@ impl Scene {
         round: Round,
     ) -> Self {
         let bounds = things.iter().map(|thing| thing.shape.bounds()).collect();
-        Self { enclosure, things, bounds, lighting, sweep, round }
+        Self { enclosure, things, bounds, lighting, repeat: f32::INFINITY, sweep, round }
+    }
+
+    /// With lamps, shadows and corners that are the same again after every `metres` along x, those of the room around x = 0.
+    pub(super) fn repeating(self, metres: f32) -> Self {
+        Self { repeat: metres, ..self }
     }
 
     /// Replaces `visible` by the things that rays of the cone may meet.
@@ -126,8 +133,13 @@ impl Scene {
             }
         };
         // Less light comes into corners of the room.
-        let margin = (point - self.enclosure.low).min(self.enclosure.high - point);
-        let light = self.lighting.irradiance(point, normal) * corner_darkening(margin, normal);
+        let mut margin = (point - self.enclosure.low).min(self.enclosure.high - point);
+        let mut place = point;
+        if self.repeat.is_finite() {
+            place.x -= self.repeat * (point.x / self.repeat).round();
+            margin.x = 0.5 * self.repeat - place.x.abs();
+        }
+        let light = self.lighting.irradiance(place, normal) * corner_darkening(margin, normal);
         // Patterns may swing below black.
         albedo.max(Vec3::ZERO) * light
     }
@@ -172,6 +184,17 @@ impl Thing {
         let half_height = 0.5 * height;
         let centre = Vec3::new(x, bottom + half_height, z);
         Self { shape: Shape::Column { centre, radius, half_height }, material }
+    }
+
+    /// The same, `shift` metres further along x, with other colours and prints for every number.
+    pub(super) fn elsewhere(&self, shift: f32, number: u32) -> Self {
+        let shape = self.shape.shifted(Vec3::new(shift, 0.0, 0.0));
+        Self { shape, material: self.material.varied(number) }
+    }
+
+    /// Middle of the thing.
+    pub(super) fn centre(&self) -> Vec3 {
+        self.shape.bounds().0
     }
 
     /// A sphere around (x, y, z).

@@ -4,6 +4,7 @@ pub mod export;
 pub mod import;
 pub mod map;
 pub mod slam;
+pub mod submaps;
 pub mod surface;
 pub mod synth;
 mod values;
@@ -74,6 +75,12 @@ pub enum Command {
     Slam(slam::Slam),
     /// Run slam with each part left out in turn and print what it is worth
     Ablate(slam::Ablate),
+    /// Split a tracked run of any length into groups that are mapped one by one, on one machine or many
+    Split(submaps::Split),
+    /// Show how far the groups of a split run are
+    Status(submaps::Status),
+    /// Make one run with one map of the groups of a split run
+    Merge(submaps::Merge),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
     /// Write the surface of the map of a RUN folder as a coloured mesh

@@ -16,6 +16,8 @@ use crate::interrupt;
 pub const BAD_INPUT: u8 = 2;
 /// Exit code of a failure that is not the input's fault.
 pub const FAILED: u8 = 1;
+/// Exit code of a group of a job that was stopped: whoever started it should try again (EX_TEMPFAIL of sysexits.h).
+pub const TRY_AGAIN: u8 = 75;
 
 /// An error that the user can repair, with advice.
 #[derive(Debug)]
@@ -66,6 +68,8 @@ impl<T, E: Into<Box<dyn Error + Send + Sync>>> OrBadInput<T> for Result<T, E> {
 pub struct Interrupted {
     what: String,
     hint: String,
+    /// Exit code; that of the signal unless it is given.
+    code: Option<u8>,
 }
 
 impl fmt::Display for Interrupted {
@@ -78,7 +82,12 @@ impl Error for Interrupted {}
 
 /// An [`Interrupted`] after `what`.
 pub fn interrupted(what: impl Into<String>, hint: impl Into<String>) -> anyhow::Error {
-    Interrupted { what: what.into(), hint: hint.into() }.into()
+    Interrupted { what: what.into(), hint: hint.into(), code: None }.into()
+}
+
+/// As [`interrupted`], for what is started by a program that tries again after [`TRY_AGAIN`].
+pub fn try_again(what: impl Into<String>, hint: impl Into<String>) -> anyhow::Error {
+    Interrupted { what: what.into(), hint: hint.into(), code: Some(TRY_AGAIN) }.into()
 }
 
 /// A failure that is not a matter of wrong use, with advice.
@@ -111,8 +120,8 @@ pub fn bad_input(message: impl Into<String>, hint: impl Into<String>) -> anyhow:
 pub fn exit_code(error: &anyhow::Error) -> u8 {
     if error.is::<BadInput>() {
         BAD_INPUT
-    } else if error.is::<Interrupted>() {
-        interrupt::exit_code()
+    } else if let Some(interrupted) = error.downcast_ref::<Interrupted>() {
+        interrupted.code.unwrap_or_else(interrupt::exit_code)
     } else {
         FAILED
     }

@@ -1,6 +1,7 @@
 //! The commands of the `mba` program as a library, so that tests can call them without a process.
 //!
-//! Exit codes: 0 done, 1 failed, 2 wrong use or bad input, 130 and 143 stopped by Ctrl-C or a request to end. Results go to stdout, everything else to stderr.
+//! Exit codes: 0 done, 1 failed, 2 wrong use or bad input, 75 stopped by a signal while mapping a
+//! group of a job: try again, 130 and 143 otherwise stopped by Ctrl-C or a request to end. Results go to stdout, everything else to stderr.
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -66,9 +67,12 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Info(args) => commands::info::run(args, console),
         Command::Calibrate(args) => commands::calibrate::run(args, console),
         Command::Track(args) => commands::track::run(args, console),
-        Command::Map(args) => commands::map::run(args, console),
+        Command::Map(args) => commands::map_job::run(args, console),
         Command::Slam(args) => commands::slam::run(args, console),
         Command::Ablate(args) => commands::ablate::run(args, console),
+        Command::Split(args) => commands::split::run(args, console),
+        Command::Status(args) => commands::status::run(args, console),
+        Command::Merge(args) => commands::merge::run(args, console),
         Command::Render(args) => commands::render::run(args, console),
         Command::Mesh(args) => commands::mesh::run(args, console),
         Command::Export(args) => commands::export::run(args, console),

@@ -11,6 +11,8 @@
 //! [`sensor`]) and takes the gradient back to map and path. A [`checkpoint`] keeps all of it, so that a stopped run can
 //! go on. The result is another [`run`], with a map.
 //!
+//! [`submaps`] maps runs of any length: split into groups that independent processes map, and merged again.
+//!
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
 //! [`rendering`] makes images of a [`map`], with [`infill`] where it has nothing, and [`surfaces`] a [`mesh`];
@@ -27,4 +29,5 @@ pub use mba_io::{
 pub use mba_map::{infill, map, rendering, surfaces, viewer_splats};
 pub use mba_raster::{exposure, gaussians, losses, raster, sensor};
 pub use mba_slam::{export, mapping, run, self_calibration, slam, tracking};
+pub use mba_submaps as submaps;
 pub use mba_synth as synth;

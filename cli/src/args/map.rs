@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use mba_mapper::map::MapKind;
 use mba_mapper::mapping::MapSettings;
 
+use super::submaps::JobWork;
 use super::values::{BlurMode, positive_seconds, seconds};
 
 /// Arguments of `mba map`.
@@ -20,17 +21,19 @@ A run that was stopped, by a kill too, goes on with --resume and ends with the s
 
 Examples:
   mba track data --out run && mba map data --trajectory run --out mapped
-  mba map data --trajectory run --out mapped --time-budget 120")]
+  mba map data --trajectory run --out mapped --time-budget 120
+  mba map job --submap 3
+  mba map job --jobs 4")]
 pub struct Map {
-    /// Folder of the data set
-    #[arg(value_name = "DATASET")]
+    /// Folder of the data set, or with --submap or --jobs of the job that `mba split` wrote
+    #[arg(value_name = "DATASET|JOB")]
     pub dataset: PathBuf,
     /// RUN folder of the tracked data set
-    #[arg(long, value_name = "RUN")]
-    pub trajectory: PathBuf,
+    #[arg(long, value_name = "RUN", required_unless_present_any = ["submap", "jobs"])]
+    pub trajectory: Option<PathBuf>,
     /// RUN folder that is written
-    #[arg(long, value_name = "RUN2")]
-    pub out: PathBuf,
+    #[arg(long, value_name = "RUN2", required_unless_present_any = ["submap", "jobs"])]
+    pub out: Option<PathBuf>,
     /// Write also over what this program did not write; never over a data set
     #[arg(long)]
     pub force: bool,
@@ -40,6 +43,9 @@ pub struct Map {
     /// How the map is made.
     #[command(flatten)]
     pub mapping: Mapping,
+    /// What of a job is mapped.
+    #[command(flatten)]
+    pub work: JobWork,
 }
 
 /// How a map is made.

@@ -17,18 +17,21 @@ use crate::report::table;
 use crate::written_run::{self, OUT_HINT, absolute, announce, claim, name, or_auto};
 
 /// Steps of the progress bar: positions are shares, not counts.
-const PROGRESS_STEPS: usize = 1000;
+pub(super) const PROGRESS_STEPS: usize = 1000;
 
 /// Makes a map of a tracked data set and prints the summary.
 ///
 /// # Errors
 /// Bad input when data set, run or checkpoint cannot be used; failure when the results cannot be written.
 pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
+    let missing = || bad_input("--trajectory and --out are needed", "see `mba map --help`");
+    let trajectory = args.trajectory.as_deref().ok_or_else(missing)?;
+    let out = args.out.as_deref().ok_or_else(missing)?;
     let dataset = open::dataset(&args.dataset)?;
-    let run = open::run(&args.trajectory)?;
+    let run = open::run(trajectory)?;
     let dataset = open::with_estimates(dataset, &run)?;
     let how = (args.force, Resumption::Option(args.resume));
-    let summary = map_into(&dataset, &run, &args.out, how, &args.mapping, console)?;
+    let summary = map_into(&dataset, &run, out, how, &args.mapping, console)?;
     console.result(&summary, table::summary)
 }
 
@@ -90,7 +93,7 @@ fn describe(dataset: &Dataset, run: &Run, args: &Mapping) -> RunSettings {
 }
 
 /// Advice for what the user can repair.
-fn advise(error: MapError, run: &Run) -> anyhow::Result<Summary> {
+pub(super) fn advise(error: MapError, run: &Run) -> anyhow::Result<Summary> {
     let disk_is_full = match &error {
         MapError::Run(error) => is_disk_full(error),
         MapError::Checkpoint(CheckpointError::File(error)) => is_disk_full(error),

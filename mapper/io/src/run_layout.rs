@@ -21,6 +21,12 @@ pub const DEBLURRED_FOLDER: &str = "deblurred";
 /// Name of the folder of the keyframes' depth maps, 16 bit in the units of the data set.
 pub const DEPTH_FOLDER: &str = "depth";
 
+/// Name of the plan of a run that was split, in the folder of the job.
+pub const SUBMAPS_FILE: &str = "submaps.json";
+
+/// Name of what the map of one group says of itself, in its RUN folder.
+pub const SUBMAP_FILE: &str = "submap.json";
+
 /// Where a run in `folder` keeps the deblurred image of keyframe `index`, the index of the frame in the data set.
 #[must_use]
 pub fn deblurred_path(folder: &Path, index: usize) -> PathBuf {
@@ -35,4 +41,11 @@ pub(crate) fn is_run(folder: &Path) -> bool {
         && summary["complete"].is_boolean()
         && summary["program"].is_string()
         && summary["frames"].is_object()
+}
+
+/// Whether a command wrote `folder` as a job: its plan has the form of one, whatever the version.
+pub(crate) fn is_job(folder: &Path) -> bool {
+    let text = read_text(&folder.join(SUBMAPS_FILE)).unwrap_or_default();
+    let plan: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    plan["format"].is_u64() && plan["program"].is_string() && plan["groups"].is_array()
 }

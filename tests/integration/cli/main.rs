@@ -18,6 +18,8 @@ mod real_camera;
 mod render;
 mod sensors;
 mod slam;
+#[cfg(unix)]
+mod submaps;
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};

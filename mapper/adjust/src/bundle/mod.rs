@@ -38,4 +38,4 @@ pub use path_step::PathPrior;
 pub use scene_map::SceneMap;
 pub use schedule::{Schedule, Stage, StepPlan};
 pub use seed_view::{DepthSource, SeedView};
-pub use world_moves::WorldMoves;
+pub use world_moves::{WorldMoves, moved_gaussian};

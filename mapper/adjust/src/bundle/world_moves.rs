@@ -39,12 +39,14 @@ impl WorldMoves {
 pub(super) fn move_gaussians(gaussians: &mut Gaussians, origins: &[u32], moves: &WorldMoves) {
     for (i, origin) in origins.iter().enumerate() {
         if let Some(gaussian) = gaussians.get(i) {
-            gaussians.set(i, &moved(&gaussian, &moves.of(*origin as usize)));
+            gaussians.set(i, &moved_gaussian(&gaussian, &moves.of(*origin as usize)));
         }
     }
 }
 
-fn moved(gaussian: &Gaussian, new_world_from_world: &RigidTransform) -> Gaussian {
+/// A Gaussian that moves with its part of the world.
+#[must_use]
+pub fn moved_gaussian(gaussian: &Gaussian, new_world_from_world: &RigidTransform) -> Gaussian {
     let [w, x, y, z] = gaussian.rotation.map(f64::from);
     let turned = new_world_from_world.rotation * UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
     let mean = Point3::from(gaussian.mean).map(f64::from).coords;

@@ -8,7 +8,7 @@ use super::lock::{self, Lock};
 use super::place::{Place, resolve};
 use super::{OutputError, is_lock};
 use crate::file_kind::kind_of;
-use crate::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER, is_run};
+use crate::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER, is_job, is_run};
 
 /// What the user allows, and what the command reads.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,6 +30,8 @@ pub(super) struct Layout {
 const DATA_SET: Layout = Layout { recognise: |_| false, folders: &[] };
 
 const RUN: Layout = Layout { recognise: is_run, folders: &[DEBLURRED_FOLDER, DEPTH_FOLDER] };
+
+const JOB: Layout = Layout { recognise: is_job, folders: &[] };
 
 /// A folder that may be written, locked until this is dropped. Nothing in it has been changed.
 #[derive(Debug)]
@@ -56,6 +58,14 @@ impl OutputFolder {
     /// See [`OutputError`]; nothing has changed then.
     pub fn for_data_set(path: &Path) -> Result<Self, OutputError> {
         Self::claim(path, &Permission::default(), &DATA_SET)
+    }
+
+    /// Claims `path` for a job of submaps: a new or empty folder, or one with an earlier job.
+    ///
+    /// # Errors
+    /// See [`OutputError`]; nothing has changed then.
+    pub fn for_job(path: &Path, permission: &Permission<'_>) -> Result<Self, OutputError> {
+        Self::claim(path, permission, &JOB)
     }
 
     /// Whether `path` is a folder with something in it and without a lock.

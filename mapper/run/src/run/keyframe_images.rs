@@ -2,12 +2,16 @@
 
 use std::fs;
 use std::io;
+use std::path::Path;
 
 use mba_io::png::{encode_depth, encode_rgb};
-use mba_io::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER};
-use mba_io::whole_file::write_together;
+use mba_io::run_layout::{DEBLURRED_FOLDER, DEPTH_FOLDER, deblurred_path};
+use mba_io::whole_file::{read, write_together};
 
 use super::{RunError, RunWriter};
+
+/// What every PNG starts with.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 impl RunWriter {
     /// Writes the deblurred image of keyframe `index`: `rgb` holds red, green, blue of each of `width * height`
@@ -36,6 +40,23 @@ impl RunWriter {
         depth: &[u16],
     ) -> Result<(), RunError> {
         self.write_image(DEPTH_FOLDER, index, encode_depth([width, height], depth))
+    }
+
+    /// Copies the images of keyframe `index` that another run has, and counts them.
+    ///
+    /// # Errors
+    /// As [`Self::write_deblurred`], and [`RunError::File`] for an image that cannot be read.
+    pub fn copy_images(&mut self, from: &Path, index: usize) -> Result<(), RunError> {
+        for name in [DEBLURRED_FOLDER, DEPTH_FOLDER] {
+            let path = from.join(name).join(format!("{index:06}.png"));
+            if path.is_file() {
+                self.write_image(name, index, Ok(read(&path, PNG)?))?;
+            }
+        }
+        if deblurred_path(from, index).is_file() {
+            self.count_deblurred();
+        }
+        Ok(())
     }
 
     fn write_image(&self, folder: &str, index: usize, png: io::Result<Vec<u8>>) -> Result<(), RunError> {

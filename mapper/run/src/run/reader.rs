@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use mba_io::checkpoint::Fingerprint;
 use mba_io::trajectory_file::{TimedExposure, read_exposures};
 use mba_io::whole_file::read_text;
 
@@ -43,6 +44,14 @@ impl Run {
             exposures: read_exposures(&folder.join(EXPOSURES_FILE))?,
             frames: frame_record::read_frames(&folder.join(FRAMES_FILE))?,
         })
+    }
+
+    /// Of the poses and of what was said of the frames, wherever the run lies.
+    #[must_use]
+    pub fn fingerprint(&self) -> Fingerprint {
+        let exposures: Vec<String> = self.exposures.iter().map(|exposure| format!("{exposure:?}")).collect();
+        let records: Vec<String> = self.frames.iter().map(|record| format!("{record:?}")).collect();
+        Fingerprint::of(&(exposures, records))
     }
 }
 

@@ -10,7 +10,9 @@ use mba_io::output::OutputFolder;
 use mba_map::map::MapSize;
 use serde::{Deserialize, Serialize};
 
-use super::other_frames::{Fit, all_exposures};
+use super::choice::choose_keyframes;
+use super::other_frames::{Fit, Fitted, all_exposures};
+use super::part::{MapPart, MappedKeyframe, MappedPart, mapped_keyframes};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, output, picture_figures};
 use crate::run::{CHECKPOINT_FILE, MapFigures, Merit, Run, RunSettings, RunWriter, Summary, plausibility};
@@ -83,38 +85,100 @@ pub fn map_dataset(
     out: OutputFolder,
     resume: bool,
     describe: RunSettings,
-    mut observe: impl FnMut(MapProgress) -> ControlFlow<()>,
+    observe: impl FnMut(MapProgress) -> ControlFlow<()>,
 ) -> Result<Summary, MapError> {
-    let started = Instant::now();
-    let mut frames = Frames::new(dataset, run, settings.continuity)?;
-    let identity = identity(dataset, run, settings);
-    let checkpoint = out.path().join(CHECKPOINT_FILE);
-    let saved: Option<Saved> =
-        if resume && checkpoint.is_file() { Some(load(&checkpoint, &identity)?) } else { None };
-    let mut bundle = prepare::bundle(dataset, &mut frames, settings)?;
-    let mut running = Running::default();
-    match saved {
-        Some(saved) => (bundle.state, running) = (saved.state, saved.running),
-        None => bundle.seed(),
+    let work = Work { dataset, run, settings, part: None };
+    work.map(out, resume, describe, observe).map(|(summary, _)| summary)
+}
+
+/// As [`map_dataset`], of a part of the run only: the map of its keyframes, and poses of its frames. All other frames are
+/// moved along with the keyframe next to them, and there are no figures that need the whole.
+///
+/// # Errors
+/// As [`map_dataset`], and [`MapError::NoKeyframe`] for a part without keyframes.
+pub fn map_part(
+    (dataset, run): (&Dataset, &Run),
+    settings: &MapSettings,
+    part: &MapPart,
+    out: OutputFolder,
+    resume: bool,
+    describe: RunSettings,
+    observe: impl FnMut(MapProgress) -> ControlFlow<()>,
+) -> Result<MappedPart, MapError> {
+    let work = Work { dataset, run, settings, part: Some(part) };
+    let (summary, keyframes) = work.map(out, resume, describe, observe)?;
+    Ok(MappedPart { summary, keyframes })
+}
+
+/// What is mapped, and how.
+struct Work<'a> {
+    dataset: &'a Dataset,
+    run: &'a Run,
+    settings: &'a MapSettings,
+    part: Option<&'a MapPart>,
+}
+
+impl Work<'_> {
+    fn map(
+        &self,
+        out: OutputFolder,
+        resume: bool,
+        describe: RunSettings,
+        mut observe: impl FnMut(MapProgress) -> ControlFlow<()>,
+    ) -> Result<(Summary, Vec<MappedKeyframe>), MapError> {
+        let Self { dataset, run, settings, part } = *self;
+        let started = Instant::now();
+        let mut frames = Frames::new(dataset, run, settings.continuity)?;
+        let identity = self.identity();
+        let checkpoint = out.path().join(CHECKPOINT_FILE);
+        let saved: Option<Saved> =
+            if resume && checkpoint.is_file() { Some(load(&checkpoint, &identity)?) } else { None };
+        let chosen = match part {
+            Some(part) => part.keyframes.clone(),
+            None => choose_keyframes(&frames.records, settings.max_keyframes),
+        };
+        let mut bundle = prepare::bundle(dataset, &mut frames, &chosen, settings)?;
+        let mut running = Running::default();
+        match saved {
+            Some(saved) => (bundle.state, running) = (saved.state, saved.running),
+            None => bundle.seed(),
+        }
+        if bundle.state.map.is_empty() {
+            return Err(MapError::NoDepth);
+        }
+        // Not before it is known that there will be a map: this replaces an earlier one.
+        let mut writer = RunWriter::create(out, describe)?;
+        // The map is made in the world of the run.
+        run.summary.upright.into_iter().for_each(|upright| writer.set_upright(upright));
+        output::push_tracked(&mut writer, &frames)?;
+        let earlier = running.seconds;
+        let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
+        let keep =
+            |state: &BundleState, running: Running| save(&checkpoint, &identity, &Saving { state, running });
+        let checkpoint = Checkpoint { interval: settings.checkpoint_interval, keep: &keep };
+        let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
+        adjustment.run(&mut bundle, &mut running, &mut observe)?;
+        running.seconds = adjustment.seconds();
+        let mapped = mapped_keyframes(&bundle, &frames);
+        let conclusion = Conclusion { dataset, frames, settings, fit: Fit::Tracked, part };
+        Ok((conclusion.write(bundle, writer, running, |_| ())?, mapped))
     }
-    if bundle.state.map.is_empty() {
-        return Err(MapError::NoDepth);
+
+    /// What a checkpoint has to agree with.
+    fn identity(&self) -> Identity {
+        let Self { dataset, run, settings, part } = *self;
+        let camera = dataset.calibration().camera;
+        let decisive = settings.decisive(camera.width * camera.height);
+        Identity {
+            program: Fingerprint::of(&(env!("CARGO_PKG_VERSION"), CHECKPOINT_VERSION)),
+            dataset: dataset_fingerprint(dataset),
+            trajectory: run.fingerprint(),
+            settings: match part {
+                None => Fingerprint::of(&decisive),
+                Some(part) => Fingerprint::of(&(decisive, part)),
+            },
+        }
     }
-    // Not before it is known that there will be a map: this replaces an earlier one.
-    let mut writer = RunWriter::create(out, describe)?;
-    // The map is made in the world of the run.
-    run.summary.upright.into_iter().for_each(|upright| writer.set_upright(upright));
-    output::push_tracked(&mut writer, &frames)?;
-    let earlier = running.seconds;
-    let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
-    let keep =
-        |state: &BundleState, running: Running| save(&checkpoint, &identity, &Saving { state, running });
-    let checkpoint = Checkpoint { interval: settings.checkpoint_interval, keep: &keep };
-    let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
-    adjustment.run(&mut bundle, &mut running, &mut observe)?;
-    running.seconds = adjustment.seconds();
-    let conclusion = Conclusion { dataset, frames, settings, fit: Fit::Tracked };
-    conclusion.write(bundle, writer, running, |_| ())
 }
 
 /// What is left to do when the map is finished.
@@ -123,6 +187,8 @@ pub(super) struct Conclusion<'a> {
     pub(super) frames: Frames,
     pub(super) settings: &'a MapSettings,
     pub(super) fit: Fit,
+    /// What of the run was mapped; `None` for all of it.
+    pub(super) part: Option<&'a MapPart>,
 }
 
 impl Conclusion<'_> {
@@ -138,15 +204,21 @@ impl Conclusion<'_> {
         let dataset = self.dataset;
         self.frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
         // Frames between keyframes follow; then what does not fit its neighbours is repaired.
-        let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, self.fit);
+        let fitted = Fitted { fit: self.fit, part: self.part };
+        let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, fitted);
         let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
         let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
         repairs.into_iter().for_each(|repair| writer.warn(repair));
-        let records = writer.frames();
-        let contradictions = contradictions(dataset, &exposures, records);
-        contradictions.into_iter().for_each(|found| writer.warn(found.to_string()));
+        if self.part.is_none() {
+            let contradictions = contradictions(dataset, &exposures, writer.frames());
+            contradictions.into_iter().for_each(|found| writer.warn(found.to_string()));
+        }
         output::write(&mut writer, dataset, &mut bundle, &exposures, &refined)?;
         // Figures need the files, and close the summary.
+        let pictures = match self.part {
+            None => picture_figures::of_bundle(dataset, &bundle, writer.folder(), &exposures),
+            Some(_) => MapFigures::default(),
+        };
         let figures = MapFigures {
             gaussians: bundle.state.map.size().gaussians(),
             map_file_bytes: writer.map_bytes(),
@@ -155,10 +227,11 @@ impl Conclusion<'_> {
             peak_memory_bytes: output::peak_memory_bytes(),
             loss: running.loss,
             keyframes: bundle.keyframes().len(),
-            ..picture_figures::image_figures(dataset, &bundle, writer.folder(), &exposures)
+            ..pictures
         };
         // Against the truth, where it is on record.
-        let merit = Merit::of(&exposures, dataset);
+        // A part is not aligned with the truth by the frames that it has not seen.
+        let merit = self.part.map_or_else(|| Merit::of(&exposures, dataset), |_| Merit::default());
         let plausibility = plausibility(&exposures, writer.frames(), dataset);
         let summary = writer.finish(|summary| {
             summary.plausibility = plausibility;
@@ -245,19 +318,6 @@ impl Adjustment<'_> {
     ) -> Result<(), MapError> {
         let running = Running { seconds: self.seconds(), ..*running };
         Ok((checkpoint.keep)(&bundle.state, running)?)
-    }
-}
-
-/// What a checkpoint has to agree with.
-fn identity(dataset: &Dataset, run: &Run, settings: &MapSettings) -> Identity {
-    let camera = dataset.calibration().camera;
-    let exposures: Vec<String> = run.exposures.iter().map(|exposure| format!("{exposure:?}")).collect();
-    let records: Vec<String> = run.frames.iter().map(|record| format!("{record:?}")).collect();
-    Identity {
-        program: Fingerprint::of(&(env!("CARGO_PKG_VERSION"), CHECKPOINT_VERSION)),
-        dataset: dataset_fingerprint(dataset),
-        trajectory: Fingerprint::of(&(exposures, records)),
-        settings: Fingerprint::of(&settings.decisive(camera.width * camera.height)),
     }
 }
 

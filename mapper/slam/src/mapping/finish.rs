@@ -87,7 +87,8 @@ impl<'a> Finish<'a> {
         adjustment.run(&mut bundle, &mut running, &mut observe)?;
         running.seconds = seconds();
         let Self { dataset, settings, frames } = self;
-        Conclusion { dataset, frames, settings, fit: Fit::Doubtful }.write(bundle, writer, running, more)
+        Conclusion { dataset, frames, settings, fit: Fit::Doubtful, part: None }
+            .write(bundle, writer, running, more)
     }
 }
 

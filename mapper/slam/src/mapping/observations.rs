@@ -11,7 +11,8 @@ use mba_raster::sensor::{ObservationPyramid, Sensor};
 const LEVELS: usize = 2;
 
 /// How frames of the data set become observations.
-pub(crate) fn sensor(dataset: &Dataset) -> Sensor {
+#[must_use]
+pub fn sensor(dataset: &Dataset) -> Sensor {
     let calibration = dataset.calibration();
     Sensor {
         camera: calibration.camera,

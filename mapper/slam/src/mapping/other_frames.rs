@@ -7,6 +7,7 @@ use mba_tracker::geometry::RigidTransform;
 
 use super::MapSettings;
 use super::observations::{observation, sensor};
+use super::part::MapPart;
 use super::prepare::Frames;
 use crate::run::FrameStatus;
 
@@ -31,15 +32,28 @@ impl Fit {
     }
 }
 
+/// Which frames are fitted, of the part of the run that is mapped; `None` for all of it.
+#[derive(Clone, Copy)]
+pub(super) struct Fitted<'a> {
+    pub(super) fit: Fit,
+    pub(super) part: Option<&'a MapPart>,
+}
+
+impl Fitted<'_> {
+    fn includes(&self, index: usize, status: FrameStatus) -> bool {
+        self.fit.includes(status) && self.part.is_none_or(|part| part.frames.contains(&index))
+    }
+}
+
 /// Exposures and logarithms of the gains of all frames: those of keyframes as they were refined, those of the others
-/// starting from the tracked ones moved along with the keyframe next to them and, as `fit` says, fitted to the map. Frames
+/// starting from the tracked ones moved along with the keyframe next to them and, as `fitted` says, fitted to the map. Frames
 /// that cannot be read are only moved along.
 pub(super) fn all_exposures(
     dataset: &Dataset,
     bundle: &mut BundleAdjustment,
     frames: &Frames,
     settings: &MapSettings,
-    fit: Fit,
+    fitted: Fitted<'_>,
 ) -> Vec<(TimedExposure, f64)> {
     let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
     let sensor = sensor(dataset);
@@ -60,7 +74,7 @@ pub(super) fn all_exposures(
         let mut state = frames.state(index, settings);
         state.path = state.path.seen_from(&moved);
         state.log_gain = reference.log_gain;
-        if fit.includes(frames.records[index].status)
+        if fitted.includes(index, frames.records[index].status)
             && let Ok(observation) = observation(dataset, &sensor, index)
         {
             let unmapped = MapKeyframe::new(

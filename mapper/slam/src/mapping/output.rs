@@ -144,7 +144,8 @@ impl<'a> Pictures<'a> {
 }
 
 /// Most memory that the process had at a time, bytes; 0 where the system does not tell.
-pub(super) fn peak_memory_bytes() -> u64 {
+#[must_use]
+pub fn peak_memory_bytes() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
     let kibibytes = line.and_then(|line| line.trim().trim_end_matches(" kB").trim().parse::<u64>().ok());

@@ -6,8 +6,10 @@ use mba_adjust::bundle::BundleAdjustment;
 use mba_eval::evaluation::{DEFAULT_MAX_DT, align_poses, psnr, ssim};
 use mba_io::dataset::{Dataset, read_image};
 use mba_io::trajectory_file::{TimedExposure, TimedPose, read_trajectory};
+use mba_map::map::Scene;
 use mba_map::rendering::{Behind, RenderedView, ViewRenderer};
 
+use super::observations::sensor;
 use crate::run::{MapFigures, deblurred_path, mid_pose};
 
 /// Name of a data set's folder of sharp images, one per frame or for some frames, named by the frame's index.
@@ -57,15 +59,35 @@ struct Picture {
     rgb: Vec<u8>,
 }
 
-/// The figures of merit of the pictures; those without a truth are absent. The deblurred keyframes lie in `folder`.
-pub(super) fn image_figures(
+/// The figures of merit of the pictures of a map; those without a truth are absent. `keyframes` are indices in the data set,
+/// their deblurred images lie in `folder`; `exposures` are those of all frames.
+#[must_use]
+pub fn picture_figures<'a>(
+    dataset: &Dataset,
+    map: impl Into<Scene<'a>>,
+    keyframes: &[usize],
+    folder: &Path,
+    exposures: &[TimedExposure],
+) -> MapFigures {
+    let read = |&index: &usize| Some((index, dataset.frame(index).ok()?.rgb));
+    let captured = keyframe_scores(dataset, keyframes.iter().filter_map(read), folder);
+    figures(captured, held_out_scores(dataset, map.into(), exposures))
+}
+
+/// As [`picture_figures`], with the pictures that the bundle has in memory.
+pub(super) fn of_bundle(
     dataset: &Dataset,
     bundle: &BundleAdjustment,
     folder: &Path,
     exposures: &[TimedExposure],
 ) -> MapFigures {
-    let [captured, deblurred] = keyframe_scores(dataset, bundle, folder);
-    let [held_out, mapped] = held_out_scores(dataset, bundle, exposures);
+    let captured =
+        bundle.keyframes().iter().map(|keyframe| (keyframe.index, keyframe.observation.level(0).rgb()));
+    let keyframes = keyframe_scores(dataset, captured, folder);
+    figures(keyframes, held_out_scores(dataset, (&bundle.state.map).into(), exposures))
+}
+
+fn figures([captured, deblurred]: [Scores; 2], [held_out, mapped]: [Scores; 2]) -> MapFigures {
     let mean = |scores: &Scores, which: usize| scores.means().map(|means| means[which]);
     MapFigures {
         keyframe_psnr_captured: mean(&captured, 0),
@@ -79,14 +101,18 @@ pub(super) fn image_figures(
     }
 }
 
-/// Captured and deblurred keyframes against the sharp images.
-fn keyframe_scores(dataset: &Dataset, bundle: &BundleAdjustment, folder: &Path) -> [Scores; 2] {
+/// Captured and deblurred keyframes against the sharp images; keyframes come with their index and captured picture.
+fn keyframe_scores(
+    dataset: &Dataset,
+    keyframes: impl Iterator<Item = (usize, Vec<u8>)>,
+    folder: &Path,
+) -> [Scores; 2] {
     let mut scores: [Scores; 2] = Default::default();
-    for keyframe in bundle.keyframes() {
-        let name = format!("{:06}.png", keyframe.index);
+    for (index, captured) in keyframes {
+        let name = format!("{index:06}.png");
         let Some(truth) = read(&dataset.folder().join(SHARP_FOLDER).join(name)) else { continue };
-        let Some(deblurred) = read(&deblurred_path(folder, keyframe.index)) else { continue };
-        scores[0].add_picture(&truth, &keyframe.observation.level(0).rgb());
+        let Some(deblurred) = read(&deblurred_path(folder, index)) else { continue };
+        scores[0].add_picture(&truth, &captured);
         scores[1].add_picture(&truth, &deblurred.rgb);
     }
     scores
@@ -94,7 +120,7 @@ fn keyframe_scores(dataset: &Dataset, bundle: &BundleAdjustment, folder: &Path) 
 
 /// Rendered views against the held-out ones, after alignment with the true trajectory: all of them, and where they show
 /// the map.
-fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[TimedExposure]) -> [Scores; 2] {
+fn held_out_scores(dataset: &Dataset, map: Scene<'_>, exposures: &[TimedExposure]) -> [Scores; 2] {
     let mut scores: [Scores; 2] = Default::default();
     let folder = dataset.folder().join(HELD_OUT_FOLDER);
     let Ok(poses) = read_trajectory(&folder.join("poses.txt")) else { return scores };
@@ -103,8 +129,8 @@ fn held_out_scores(dataset: &Dataset, bundle: &BundleAdjustment, exposures: &[Ti
     let map_from_truth = alignment.reference_from_estimate.inverse();
     let calibration = dataset.calibration();
     let (camera, response) = (calibration.camera, calibration.response.inverse());
-    let mut renderer = ViewRenderer::new(&bundle.state.map, camera, &response, calibration.depth_scale)
-        .through(bundle.sensor().falloff.clone());
+    let mut renderer =
+        ViewRenderer::new(map, camera, &response, calibration.depth_scale).through(sensor(dataset).falloff);
     for (index, pose) in poses.iter().enumerate() {
         let Some(truth) = read(&folder.join(format!("{index:06}.png"))) else { continue };
         let view = renderer.render(&map_from_truth.compose(&pose.world_from_camera), Behind::Surroundings);

@@ -13,7 +13,6 @@ use mba_tracker::SimdLevel;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
-use super::choice::choose_keyframes;
 use super::evidence::FrameEvidence;
 use super::observations::{observation, sensor};
 use super::run_continuity::{RepairedRun, repair_run, run_frames};
@@ -156,15 +155,15 @@ impl Frames {
     }
 }
 
-/// The bundle with an empty map, and the index in the data set of every keyframe; frames that cannot be read are left
-/// out with a warning.
+/// The bundle of the chosen keyframes, ascending indices in the data set, with an empty map; frames that cannot be read are
+/// left out with a warning.
 pub(super) fn bundle(
     dataset: &Dataset,
     frames: &mut Frames,
+    chosen: &[usize],
     settings: &MapSettings,
 ) -> Result<BundleAdjustment, MapError> {
     let sensor = sensor(dataset);
-    let chosen = choose_keyframes(&frames.records, settings.max_keyframes);
     // Images are read side by side, and kept in the order of the frames.
     let load = |&index: &usize| (index, observation(dataset, &sensor, index));
     let loaded: Vec<_> = chosen.par_iter().map(load).collect();

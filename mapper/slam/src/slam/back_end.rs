@@ -279,7 +279,8 @@ impl BackEnd {
         view
     }
 
-    /// Whether the map explains a frame better than the nearest keyframe does, and that keyframe as a view.
+    /// Whether the map explains a frame better than the nearest keyframe does, and that keyframe as a view. Without a keyframe
+    /// nearby nothing speaks for the map, and the tracker goes on with keyframes of its own.
     fn judge(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> (bool, Option<SharpView>) {
         let relocaliser = self.loops.relocaliser();
         let Some(keyframe) = self.map.nearest_other(pose, image.index) else { return (false, None) };

@@ -39,6 +39,10 @@ const WINDOW: usize = 8;
 /// A map is young for so many steps.
 const YOUNG_STEPS: usize = 60;
 
+/// Movement of the picture, as a fraction of its width, beyond which a keyframe says nothing about a view: the map between
+/// it and there was fitted to no picture that is still known.
+const NEARBY: f64 = 0.08;
+
 /// Steps between two changes of density.
 const DENSITY_EVERY: usize = 48;
 
@@ -156,11 +160,13 @@ impl GrowingMap {
         self.steps >= YOUNG_STEPS
     }
 
-    /// The keyframe with the view nearest to a pose, other than frame `index` itself.
+    /// The keyframe with the view nearest to a pose, other than frame `index` itself; none where all are far, because those
+    /// nearby were given up or the camera has just come.
     pub(super) fn nearest_other(&self, world_from_camera: &RigidTransform, index: usize) -> Option<usize> {
         let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
-        let mut keyframes = near.iter().map(|near| near.keyframe);
-        keyframes.find(|&k| self.bundle.keyframes()[k].index != index)
+        let nearest = near.iter().find(|near| self.bundle.keyframes()[near.keyframe].index != index)?;
+        let is_near = nearest.pixels <= NEARBY * self.sensor.camera.width as f64;
+        is_near.then_some(nearest.keyframe)
     }
 
     /// Adds what the newest keyframe shows, and allows the map to grow accordingly.

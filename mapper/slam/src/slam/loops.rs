@@ -16,6 +16,9 @@ use super::saved::SavedLoops;
 /// Keyframes before the newest that are no place seen *again*.
 const RECENT: usize = 12;
 
+/// Where keyframes were given up those that are left lie far apart: then no more than this share of them is recent.
+const RECENT_SHARE: f64 = 0.25;
+
 /// Similarity from which a keyframe is worth a look, and how many are looked at.
 const MIN_SIMILARITY: f32 = 0.7;
 const MOST_CANDIDATES: usize = 3;
@@ -116,7 +119,11 @@ impl Loops {
         let keyframes = map.bundle.keyframes();
         let newest = keyframes.len().checked_sub(1)?;
         // Keyframes just before are always similar, and say nothing about drift.
-        let old: Vec<usize> = keyframes[..newest.saturating_sub(RECENT)].iter().map(|k| k.index).collect();
+        let recent = match map.retired {
+            0 => RECENT,
+            _ => RECENT.min((RECENT_SHARE * keyframes.len() as f64) as usize),
+        };
+        let old: Vec<usize> = keyframes[..newest.saturating_sub(recent)].iter().map(|k| k.index).collect();
         let (before, view, measurement) = self.recognise(map, image, |id| old.contains(&id))?;
         // Where the map says that the newest keyframe is, in pixels from where the old place says it is.
         let now = map.bundle.state.frames[newest].path.mid();

@@ -1,6 +1,6 @@
 //! What a source tells of its cameras.
 
-use mba_io::dataset::{Calibration, DepthCamera, ExposureSource, Knowledge, Readout, Response, Vignetting};
+use mba_io::dataset::{Calibration, DepthCamera, ExposureSource, Knowledge, Response, Shutter, Vignetting};
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use nalgebra::Rotation3;
 
@@ -19,7 +19,7 @@ pub(crate) struct Facts {
     /// Of all frames.
     pub(crate) exposure_seconds: Option<f64>,
     /// How rows are read out, where that is on record.
-    pub(crate) readout: Option<Readout>,
+    pub(crate) readout: Option<Shutter>,
     pub(crate) response: Option<Response>,
     pub(crate) vignetting: Option<Vignetting>,
     /// First row of depth to the last, seconds.
@@ -47,7 +47,7 @@ impl Facts {
 
     /// The camera of a telephone: rows are read out one after the other, colours are those of displays.
     pub(crate) fn telephone(mut self) -> Self {
-        self.readout = Some(Readout::Rolling { seconds: None });
+        self.readout = Some(Shutter::Rolling { seconds: None });
         self.response = Some(Response::Srgb);
         self
     }

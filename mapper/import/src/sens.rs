@@ -5,7 +5,7 @@ use std::io::Read;
 use std::path::Path;
 
 use flate2::read::ZlibDecoder;
-use mba_io::dataset::{DepthCamera, Readout};
+use mba_io::dataset::{DepthCamera, Shutter};
 use mba_tracker::geometry::{Distortion, PinholeCamera, RigidTransform};
 
 use crate::destination::Destination;
@@ -76,7 +76,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
         destination.note("frames have no times: 30 per second are assumed");
     }
     let mut facts = Facts::new(head.colour, head.scale);
-    facts.readout = Some(Readout::Rolling { seconds: None });
+    facts.readout = Some(Shutter::Rolling { seconds: None });
     facts.depth_camera = (head.depth != head.colour || head.colour_from_depth != RigidTransform::identity())
         .then_some(DepthCamera {
             camera: head.depth,

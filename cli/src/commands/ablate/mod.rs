@@ -1,20 +1,13 @@
 //! `mba ablate`.
 
+mod repeats;
 mod slam;
 mod tracker;
-
-use std::path::{Path, PathBuf};
-
-use mba_mapper::dataset::{Dataset, DatasetError};
-use mba_mapper::run::{Run, Summary};
 
 use super::{calibrate, open};
 use crate::args::Switch;
 use crate::args::slam::{Ablate, Ablated};
 use crate::console::Console;
-
-/// Relative step between the focal lengths of repeated runs: a twentieth of a pixel in the corner, which nobody knows better.
-const NUDGE: f64 = 1e-4;
 
 /// Runs SLAM or the tracker with each part left out in turn and prints a table.
 ///
@@ -25,74 +18,5 @@ pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
     match args.of {
         Ablated::Slam => slam::run(&dataset, args, console),
         Ablated::Track => tracker::run(&dataset, args, console),
-    }
-}
-
-/// Folder of run `repeat`, counted from 0, of the row `name`.
-fn folder(args: &Ablate, name: &str, repeat: u16) -> PathBuf {
-    let name = name.replace(' ', "-");
-    let name = if repeat == 0 { name } else { format!("{name}-{}", repeat + 1) };
-    args.out.join(name)
-}
-
-/// The summary of a run that was finished before.
-fn finished(out: &Path) -> Option<Summary> {
-    Run::open(out).ok().map(|run| run.summary).filter(|summary| summary.complete)
-}
-
-/// The data set with focal lengths that differ a little from those on record, except in the first run.
-fn nudged(dataset: &Dataset, repeat: u16) -> Result<Dataset, DatasetError> {
-    if repeat == 0 {
-        return Ok(dataset.clone());
-    }
-    // 1, -1, 2, -2 and so on.
-    let steps = f64::from(repeat.div_ceil(2)) * if repeat % 2 == 1 { 1.0 } else { -1.0 };
-    let mut calibration = dataset.calibration().clone();
-    calibration.camera.fx *= 1.0 + steps * NUDGE;
-    calibration.camera.fy *= 1.0 + steps * NUDGE;
-    with_same_sensors(dataset, calibration)
-}
-
-/// The data set with another calibration, and without an IMU if it had none that is used.
-fn with_same_sensors(
-    dataset: &Dataset,
-    calibration: mba_mapper::dataset::Calibration,
-) -> Result<Dataset, DatasetError> {
-    let has_imu = dataset.imu().is_some();
-    let dataset = dataset.clone().with_calibration(calibration)?;
-    let is_back = !has_imu && dataset.imu().is_some();
-    Ok(if is_back { dataset.without_imu("it is not used in this run".to_owned()) } else { dataset })
-}
-
-/// Middle, least and most of the figures of repeated runs; none if a run has none.
-fn spread(values: impl Iterator<Item = Option<f64>>) -> Option<[f64; 3]> {
-    let mut values: Vec<f64> = values.collect::<Option<_>>()?;
-    values.sort_by(f64::total_cmp);
-    let (first, last) = (*values.first()?, *values.last()?);
-    let middle = 0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2]);
-    Some([middle, first, last])
-}
-
-/// A figure with its spread, if there was more than one run.
-fn cell(spread: Option<[f64; 3]>, digits: usize, width: usize) -> String {
-    let text = match spread {
-        None => "-".to_owned(),
-        Some([middle, least, most]) if least == most => format!("{middle:.digits$}"),
-        Some([middle, least, most]) => format!("{middle:.digits$} [{least:.digits$} {most:.digits$}]"),
-    };
-    format!("{text:>width$}")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn repeated_figures_have_a_middle_and_a_spread() {
-        let values = [3.0, 1.0, 2.0, 5.0];
-        assert_eq!(spread(values.iter().copied().map(Some)), Some([2.5, 1.0, 5.0]));
-        assert_eq!(spread([Some(1.0), None].into_iter()), None);
-        assert_eq!(cell(Some([2.5, 1.0, 5.0]), 1, 14), " 2.5 [1.0 5.0]");
-        assert_eq!((cell(Some([2.5; 3]), 2, 6), cell(None, 2, 6)), ("  2.50".into(), "     -".into()));
     }
 }

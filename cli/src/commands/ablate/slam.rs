@@ -5,7 +5,7 @@ use mba_mapper::run::Summary;
 use serde::Serialize;
 
 use super::super::slam;
-use super::{cell, finished, folder, nudged, spread};
+use super::repeats::{cell, finished, folder, nudged, spread};
 use crate::args::slam::{Ablate, Ablation, MapReference, Slamming};
 use crate::args::{BlurMode, Switch};
 use crate::console::Console;

@@ -7,7 +7,7 @@ use mba_mapper::run::Summary;
 use serde::Serialize;
 
 use super::super::track;
-use super::{cell, finished, folder, nudged, spread, with_same_sensors};
+use super::repeats::{cell, finished, folder, nudged, spread, with_same_sensors};
 use crate::args::slam::Ablate;
 use crate::args::{BlurMode, Reference, Switch, Tracking};
 use crate::console::Console;

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use mba_io::dataset::Readout;
+use mba_io::dataset::Shutter;
 use mba_io::text_lines::TextFile;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -59,7 +59,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
     }
     let mut facts = Facts::new(CAMERA, 5000.0);
     facts.frame_rate = Some(FRAME_RATE);
-    facts.readout = Some(Readout::Global);
+    facts.readout = Some(Shutter::Global);
     Ok(facts)
 }
 

@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use mba_io::dataset::{DepthCamera, Readout};
+use mba_io::dataset::{DepthCamera, Shutter};
 use mba_io::text_lines::TextFile;
 use mba_io::whole_file::read_text;
 use mba_tracker::geometry::{Distortion, PinholeCamera, RigidTransform};
@@ -43,7 +43,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
     };
     destination.note("frames have no times: 30 per second are assumed");
     facts.frame_rate = Some(FRAME_RATE);
-    facts.readout = Some(Readout::Rolling { seconds: None });
+    facts.readout = Some(Shutter::Rolling { seconds: None });
     // Poses are those of the depth camera.
     let depth_from_colour =
         facts.depth_camera.map_or_else(RigidTransform::identity, |depth| depth.colour_from_depth.inverse());

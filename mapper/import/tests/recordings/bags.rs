@@ -3,7 +3,7 @@
 use std::fs;
 
 use mba_import::{ImportError, ImportOptions, Source};
-use mba_io::dataset::Readout;
+use mba_io::dataset::Shutter;
 use mba_tracker::geometry::{Distortion, PinholeCamera};
 use nalgebra::Vector3;
 
@@ -35,7 +35,7 @@ fn check_recording(brought: &Brought, ending: &str) {
     assert_eq!(calibration.camera, expected);
     let lens = Distortion { k1: 0.1, k2: -0.05, p1: 0.001, p2: -0.002, k3: 0.01 };
     assert_eq!((calibration.distortion, calibration.depth_scale), (lens, 1000.0));
-    assert_eq!(calibration.readout, Readout::Global);
+    assert_eq!(calibration.readout, Shutter::Global);
     let own = calibration.depth_camera.unwrap();
     let expected = PinholeCamera { width: 8, height: 6, fx: 7.125, fy: 7.25, cx: 3.5, cy: 2.5 };
     assert_eq!((own.camera, own.distortion), (expected, Distortion::default()));

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use mba_import::{ImportError, ImportOptions, Source, import};
-use mba_io::dataset::{Readout, Response};
+use mba_io::dataset::{Response, Shutter};
 use mba_tracker::geometry::{Distortion, PinholeCamera, RigidTransform};
 use nalgebra::Vector3;
 
@@ -46,7 +46,7 @@ fn check_poses(brought: &Brought, count: usize) {
 /// A telephone's camera, its depth of half the size and with a third of it unsure.
 fn check_telephone(brought: &Brought) {
     let calibration = brought.dataset.calibration();
-    assert_eq!(calibration.readout, Readout::Rolling { seconds: None });
+    assert_eq!(calibration.readout, Shutter::Rolling { seconds: None });
     assert_eq!((&calibration.response, calibration.depth_camera), (&Response::Srgb, None));
     let frame = brought.dataset.frame(0).unwrap();
     assert_eq!((frame.width, frame.height), COLOUR);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use mba_adjust::bundle::{BundleAdjustment, Keyframe};
+use mba_adjust::bundle::{BundleAdjustment, MapKeyframe};
 use mba_raster::exposure::ExposurePath;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Matrix6, Vector6};
@@ -58,7 +58,7 @@ pub(super) fn mapped_keyframes(bundle: &BundleAdjustment, frames: &Frames) -> Ve
 }
 
 /// How well the picture of a keyframe tells where its camera is: by the pixels that a movement is seen as.
-fn information(keyframe: &Keyframe) -> Matrix6<f64> {
+fn information(keyframe: &MapKeyframe) -> Matrix6<f64> {
     let in_camera = ExposurePath::still(RigidTransform::identity());
     let units = |k: usize| {
         let tangent = Vector6::from_fn(|row, _| if row == k { 1.0 } else { 0.0 });

@@ -21,8 +21,8 @@ other groups that see the same. JOB gets submaps.json; `mba map JOB --submap K` 
 order and on any machine, and `mba merge JOB` makes one run of them.
 
 Examples:
-  mba track data --out run && mba split run --out job
-  mba map job --jobs 4 && mba merge job --out mapped")]
+  mba split run --out job
+  mba split run --out job --group-keyframes 40")]
 pub struct Split {
     /// RUN folder that `mba track` or `mba slam` wrote
     #[arg(value_name = "RUN")]

@@ -223,5 +223,5 @@ fn missing_stale_and_foreign_groups_are_refused_by_name() {
     none.assert_error(2, &["run is not a job: it has no submaps.json"]);
     split
         .call(&["map", "job", "--submap", "9"])
-        .assert_error(2, &["job has no group 9: there are 3, from 0"]);
+        .assert_error(2, &["job has no group 9: there are 2, from 0"]);
 }

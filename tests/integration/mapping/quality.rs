@@ -57,9 +57,14 @@ fn poses_and_motions_stay_good() {
     let before = Merit::of(&tracked.exposures, &sequence.dataset);
     let ate = |figures: &Option<TrajectoryFigures>| figures.as_ref().unwrap().ate_m.rmse;
     let [before, after] = [&before.trajectory, &summary.trajectory].map(ate);
-    // Measured: 0.4 mm, then 0.9 mm. A millimetre is a thirteenth of a pixel where most surfaces are.
+    // Measured: 0.4 mm, twice. What was tracked for certain stays where it is.
     println!("{before:.6} m, then {after:.6} m");
-    assert!(after < before + 0.001, "{before} m, then {after} m");
+    assert!(after < 1.02 * before, "{before} m, then {after} m");
+    let run = Run::open(&sequence.path("mapped")).unwrap();
+    for (refined, tracked) in run.exposures.iter().zip(&tracked.exposures) {
+        let moved = (refined.mid.translation - tracked.mid.translation).norm();
+        assert!(moved < 1e-6, "{moved} m at {} s", tracked.timestamp);
+    }
     let blur = summary.blur.as_ref().unwrap();
     // Measured: 0.047.
     let [error, direction] = [blur.median_relative_error, blur.direction_share].map(Option::unwrap);

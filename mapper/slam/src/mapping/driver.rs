@@ -7,6 +7,7 @@ use mba_adjust::bundle::{BundleAdjustment, BundleState, MapModel};
 use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;
+use mba_io::trajectory_file::TimedExposure;
 use mba_map::map::MapSize;
 use serde::{Deserialize, Serialize};
 
@@ -206,7 +207,9 @@ impl Conclusion<'_> {
         // Frames between keyframes follow; then what does not fit its neighbours is repaired.
         let fitted = Fitted { fit: self.fit, part: self.part };
         let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, fitted);
-        let exposures: Vec<_> = refined.iter().map(|(exposure, _)| *exposure).collect();
+        let in_place =
+            |(index, (exposure, _)): (usize, &(TimedExposure, f64))| self.frames.in_place(index, exposure);
+        let exposures: Vec<_> = refined.iter().enumerate().map(in_place).collect();
         let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
         repairs.into_iter().for_each(|repair| writer.warn(repair));
         if self.part.is_none() {

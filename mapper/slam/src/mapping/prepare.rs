@@ -143,6 +143,17 @@ impl Frames {
         Ok((repaired.exposures, warnings))
     }
 
+    /// A refined exposure as it is written: its motion as the map shows it, its middle where it was tracked, if it was measured
+    /// there. A map explains its own keyframes with moved cameras as well as without; no pixel that it has not seen confirms
+    /// such a move.
+    pub(super) fn in_place(&self, index: usize, refined: &TimedExposure) -> TimedExposure {
+        if !self.priors[index].is_measured {
+            return *refined;
+        }
+        let mid = self.exposures[index].mid;
+        TimedExposure { mid, ..refined.seen_from(&mid.compose(&refined.mid.inverse())) }
+    }
+
     /// The exposure of a frame with that state.
     pub(super) fn exposure_of(&self, index: usize, state: &FrameState) -> TimedExposure {
         state.path.stretched(1.0 / self.stretches[index]).timed(self.exposures[index].timestamp)

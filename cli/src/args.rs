@@ -69,7 +69,7 @@ pub enum Command {
     Calibrate(Calibrate),
     /// Track a data set: camera poses at opening, middle and closing of the shutter of every frame
     Track(Track),
-    /// Make a sharp map of a tracked data set, refine all poses and deblur keyframes
+    /// Make a sharp map of a tracked data set, refine all exposures and deblur keyframes
     Map(map::Map),
     /// Track and map a data set at the same time
     Slam(slam::Slam),

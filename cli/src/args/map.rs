@@ -15,7 +15,7 @@ use super::values::{BlurMode, positive_seconds, seconds};
 #[derive(Debug, Args)]
 #[command(after_help = "\
 RUN2 gets map.ply, which opens in any viewer of Gaussian splats, or map.mbaf with the tri-plane field, deblurred/ \
-and depth/ with a PNG per keyframe, and refined poses of all frames in the files that `mba track` writes.
+and depth/ with a PNG per keyframe, and refined exposures of all frames in the files that `mba track` writes.
 
 A run that was stopped, by a kill too, goes on with --resume and ends with the same files as one that was not.
 

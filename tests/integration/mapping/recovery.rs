@@ -2,7 +2,7 @@
 
 use mba_mapper::exposure::motion_of;
 use mba_mapper::mapping::MapSettings;
-use mba_mapper::run::Run;
+use mba_mapper::run::{FrameStatus, Run};
 use mba_mapper::synth::{
     CameraMotion, DepthSensor, Events, ResponseCurve, SceneName, SensorModel, SynthConfig,
 };
@@ -54,13 +54,14 @@ fn linear(timestamp: f64, ends: &ExposureTrajectory) -> TimedExposure {
     TimedExposure { timestamp, start: ends.start, mid: ends.mid(), end: ends.end }
 }
 
-/// Exposures of all frames after mapping from `exposures`.
+/// Exposures of all frames after mapping from `exposures`, whose poses are in doubt: others stay where they were tracked.
 fn mapped(
     sequence: &BlurredSequence,
     exposures: &[TimedExposure],
     settings: &MapSettings,
 ) -> Vec<TimedExposure> {
-    let run = sequence.run_of("run", exposures);
+    let mut run = sequence.run_of("run", exposures);
+    run.frames.iter_mut().for_each(|frame| frame.status = FrameStatus::Weak);
     let summary = sequence.map(&run, "mapped", settings);
     assert_eq!(summary.warnings, [""; 0]);
     Run::open(&sequence.path("mapped")).unwrap().exposures

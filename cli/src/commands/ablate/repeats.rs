@@ -6,19 +6,45 @@ use mba_mapper::dataset::{Calibration, Dataset, DatasetError};
 use mba_mapper::run::{Run, Summary};
 
 use crate::args::slam::Ablate;
+use crate::console::Console;
 
 /// Relative step between the focal lengths of repeated runs: a twentieth of a pixel in the corner, which nobody knows better.
 const NUDGE: f64 = 1e-4;
 
+/// Width of a column of the table, and of the names of its rows.
+const WIDTH: usize = 22;
+
+/// Middle, least and most of a figure over repeated runs; none where a run has none.
+pub(super) type Spread = Option<[f64; 3]>;
+
+/// The summaries of the repeated runs of the row `name`. A run that was finished before is not made again; `run` makes one, with
+/// its number from 0 and its folder.
+pub(super) fn summaries(
+    args: &Ablate,
+    name: &str,
+    console: &Console,
+    run: impl Fn(u16, &Path) -> anyhow::Result<Summary>,
+) -> anyhow::Result<Vec<Summary>> {
+    let one = |repeat| {
+        let out = folder(args, name, repeat);
+        if let Some(summary) = finished(&out) {
+            return Ok(summary);
+        }
+        console.note(format!("{name}, run {} of {}:", repeat + 1, args.repeats));
+        run(repeat, &out)
+    };
+    (0..args.repeats).map(one).collect()
+}
+
 /// Folder of run `repeat`, counted from 0, of the row `name`.
-pub(super) fn folder(args: &Ablate, name: &str, repeat: u16) -> PathBuf {
+fn folder(args: &Ablate, name: &str, repeat: u16) -> PathBuf {
     let name = name.replace(' ', "-");
     let name = if repeat == 0 { name } else { format!("{name}-{}", repeat + 1) };
     args.out.join(name)
 }
 
 /// The summary of a run that was finished before.
-pub(super) fn finished(out: &Path) -> Option<Summary> {
+fn finished(out: &Path) -> Option<Summary> {
     Run::open(out).ok().map(|run| run.summary).filter(|summary| summary.complete)
 }
 
@@ -46,8 +72,12 @@ pub(super) fn with_same_sensors(
     Ok(if is_back { dataset.without_imu("it is not used in this run".to_owned()) } else { dataset })
 }
 
-/// Middle, least and most of the figures of repeated runs; none if a run has none.
-pub(super) fn spread(values: impl Iterator<Item = Option<f64>>) -> Option<[f64; 3]> {
+/// The spread of a figure over the runs of a row.
+pub(super) fn spread(summaries: &[Summary], figure: fn(&Summary) -> Option<f64>) -> Spread {
+    spread_of(summaries.iter().map(figure))
+}
+
+fn spread_of(values: impl Iterator<Item = Option<f64>>) -> Spread {
     let mut values: Vec<f64> = values.collect::<Option<_>>()?;
     values.sort_by(f64::total_cmp);
     let (first, last) = (*values.first()?, *values.last()?);
@@ -55,8 +85,21 @@ pub(super) fn spread(values: impl Iterator<Item = Option<f64>>) -> Option<[f64; 
     Some([middle, first, last])
 }
 
+/// A table with a line for each row: its name, and each figure with its number of digits.
+pub(super) fn table<'a, const N: usize>(
+    head: [&str; N],
+    rows: impl Iterator<Item = (&'a str, [(Spread, usize); N])>,
+) -> String {
+    let mut text = format!("{:WIDTH$}", "") + &head.map(|name| format!("{name:>WIDTH$}")).concat() + "\n";
+    for (name, figures) in rows {
+        let cells = figures.map(|(spread, digits)| cell(spread, digits, WIDTH));
+        text += &format!("{name:WIDTH$}{}\n", cells.concat());
+    }
+    text
+}
+
 /// A figure with its spread, if there was more than one run.
-pub(super) fn cell(spread: Option<[f64; 3]>, digits: usize, width: usize) -> String {
+fn cell(spread: Spread, digits: usize, width: usize) -> String {
     let text = match spread {
         None => "-".to_owned(),
         Some([middle, least, most]) if least == most => format!("{middle:.digits$}"),
@@ -72,8 +115,8 @@ mod tests {
     #[test]
     fn repeated_figures_have_a_middle_and_a_spread() {
         let values = [3.0, 1.0, 2.0, 5.0];
-        assert_eq!(spread(values.iter().copied().map(Some)), Some([2.5, 1.0, 5.0]));
-        assert_eq!(spread([Some(1.0), None].into_iter()), None);
+        assert_eq!(spread_of(values.iter().copied().map(Some)), Some([2.5, 1.0, 5.0]));
+        assert_eq!(spread_of([Some(1.0), None].into_iter()), None);
         assert_eq!(cell(Some([2.5, 1.0, 5.0]), 1, 14), " 2.5 [1.0 5.0]");
         assert_eq!((cell(Some([2.5; 3]), 2, 6), cell(None, 2, 6)), ("  2.50".into(), "     -".into()));
     }

@@ -5,7 +5,7 @@ use mba_mapper::run::Summary;
 use serde::Serialize;
 
 use super::super::slam;
-use super::repeats::{cell, finished, folder, nudged, spread};
+use super::repeats::{self, Spread, nudged, spread};
 use crate::args::slam::{Ablate, Ablation, MapReference, Slamming};
 use crate::args::{BlurMode, Switch};
 use crate::console::Console;
@@ -19,13 +19,13 @@ const FEW_VIEWS: usize = 3;
 struct Row {
     name: &'static str,
     runs: usize,
-    ate_cm: Option<[f64; 3]>,
-    tracked_ate_cm: Option<[f64; 3]>,
-    end_drift_cm: Option<[f64; 3]>,
-    deblurred_psnr: Option<[f64; 3]>,
-    heldout_psnr: Option<[f64; 3]>,
-    frames_per_second: Option<[f64; 3]>,
-    lost: Option<[f64; 3]>,
+    ate_cm: Spread,
+    tracked_ate_cm: Spread,
+    end_drift_cm: Spread,
+    deblurred_psnr: Spread,
+    heldout_psnr: Spread,
+    frames_per_second: Spread,
+    lost: Spread,
 }
 
 /// Runs SLAM with each part left out in turn and prints a table.
@@ -35,20 +35,11 @@ struct Row {
 pub(super) fn run(dataset: &Dataset, args: &Ablate, console: &Console) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for (name, ablation) in variants() {
-        let mut summaries = Vec::new();
-        for repeat in 0..args.repeats {
-            let out = folder(args, name, repeat);
-            let summary = match finished(&out) {
-                Some(summary) => summary,
-                None => {
-                    console.note(format!("{name}, run {} of {}:", repeat + 1, args.repeats));
-                    let slamming = Slamming { ablation, ..Slamming::default() };
-                    let dataset = nudged(dataset, repeat)?;
-                    slam::slam_into(&dataset, &out, (false, Resumption::Always), &slamming, console)?
-                }
-            };
-            summaries.push(summary);
-        }
+        let summaries = repeats::summaries(args, name, console, |repeat, out| {
+            let slamming = Slamming { ablation, ..Slamming::default() };
+            let dataset = nudged(dataset, repeat)?;
+            slam::slam_into(&dataset, out, (false, Resumption::Always), &slamming, console)
+        })?;
         rows.push(Row::new(name, &summaries));
     }
     console.result(&rows, |rows| table(rows))
@@ -71,7 +62,7 @@ fn variants() -> [(&'static str, Ablation); 8] {
 
 impl Row {
     fn new(name: &'static str, summaries: &[Summary]) -> Self {
-        let of = |figure: fn(&Summary) -> Option<f64>| spread(summaries.iter().map(figure));
+        let of = |figure| spread(summaries, figure);
         Self {
             name,
             runs: summaries.len(),
@@ -87,20 +78,17 @@ impl Row {
 }
 
 fn table(rows: &[Row]) -> String {
-    const WIDTH: usize = 22;
     let head = ["ATE cm", "as tracked", "end drift", "deblurred dB", "held out dB", "frames/s", "lost"];
-    let mut text = format!("{:22}", "") + &head.map(|name| format!("{name:>WIDTH$}")).concat() + "\n";
-    for row in rows {
-        let cells = [
-            cell(row.ate_cm, 3, WIDTH),
-            cell(row.tracked_ate_cm, 3, WIDTH),
-            cell(row.end_drift_cm, 3, WIDTH),
-            cell(row.deblurred_psnr, 2, WIDTH),
-            cell(row.heldout_psnr, 2, WIDTH),
-            cell(row.frames_per_second, 2, WIDTH),
-            cell(row.lost, 0, WIDTH),
-        ];
-        text += &format!("{:22}{}\n", row.name, cells.concat());
-    }
-    text
+    let figures = |row: &Row| {
+        [
+            (row.ate_cm, 3),
+            (row.tracked_ate_cm, 3),
+            (row.end_drift_cm, 3),
+            (row.deblurred_psnr, 2),
+            (row.heldout_psnr, 2),
+            (row.frames_per_second, 2),
+            (row.lost, 0),
+        ]
+    };
+    repeats::table(head, rows.iter().map(|row| (row.name, figures(row))))
 }

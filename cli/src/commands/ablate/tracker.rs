@@ -7,7 +7,7 @@ use mba_mapper::run::Summary;
 use serde::Serialize;
 
 use super::super::track;
-use super::repeats::{cell, finished, folder, nudged, spread, with_same_sensors};
+use super::repeats::{self, Spread, nudged, spread, with_same_sensors};
 use crate::args::slam::Ablate;
 use crate::args::{BlurMode, Reference, Switch, Tracking};
 use crate::console::Console;
@@ -21,12 +21,12 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
 struct Row {
     name: &'static str,
     runs: usize,
-    ate_cm: Option<[f64; 3]>,
-    length_error_percent: Option<[f64; 3]>,
-    direction_percent: Option<[f64; 3]>,
-    impossible: Option<[f64; 3]>,
-    reversing_percent: Option<[f64; 3]>,
-    lost: Option<[f64; 3]>,
+    ate_cm: Spread,
+    length_error_percent: Spread,
+    direction_percent: Spread,
+    impossible: Spread,
+    reversing_percent: Spread,
+    lost: Spread,
 }
 
 /// What is left out.
@@ -63,7 +63,8 @@ impl Part {
                 readout.readout_seconds().is_some_and(|seconds| seconds != 0.0)
                     || *depth_readout_seconds != 0.0
             }
-            Self::Imu => dataset.imu().is_some(),
+            // The accelerometer turns the world, it does not track.
+            Self::Imu => dataset.imu().is_some_and(|imu| !imu.angular_velocities().is_empty()),
             _ => true,
         }
     }
@@ -99,20 +100,11 @@ impl Part {
 pub(super) fn run(dataset: &Dataset, args: &Ablate, console: &Console) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for part in Part::ALL.into_iter().filter(|part| part.is_in(dataset)) {
-        let mut summaries = Vec::new();
-        for repeat in 0..args.repeats {
-            let out = folder(args, part.name(), repeat);
-            let summary = match finished(&out) {
-                Some(summary) => summary,
-                None => {
-                    console.note(format!("{}, run {} of {}:", part.name(), repeat + 1, args.repeats));
-                    let dataset = part.left_out(nudged(dataset, repeat)?)?;
-                    let how = (false, Resumption::Always);
-                    track::track_into(&dataset, &out, how, CHECKPOINT_INTERVAL, &part.tracking(), console)?
-                }
-            };
-            summaries.push(summary);
-        }
+        let summaries = repeats::summaries(args, part.name(), console, |repeat, out| {
+            let dataset = part.left_out(nudged(dataset, repeat)?)?;
+            let how = (false, Resumption::Always);
+            track::track_into(&dataset, out, how, CHECKPOINT_INTERVAL, &part.tracking(), console)
+        })?;
         rows.push(Row::new(part.name(), &summaries));
     }
     console.result(&rows, |rows| table(rows))
@@ -120,7 +112,7 @@ pub(super) fn run(dataset: &Dataset, args: &Ablate, console: &Console) -> anyhow
 
 impl Row {
     fn new(name: &'static str, summaries: &[Summary]) -> Self {
-        let of = |figure: fn(&Summary) -> Option<f64>| spread(summaries.iter().map(figure));
+        let of = |figure| spread(summaries, figure);
         Self {
             name,
             runs: summaries.len(),
@@ -138,20 +130,16 @@ impl Row {
 }
 
 fn table(rows: &[Row]) -> String {
-    const WIDTH: usize = 22;
     let head = ["ATE cm", "length error %", "direction %", "impossible", "reversing %", "lost"];
-    let head = head.map(|name| format!("{name:>WIDTH$}")).concat();
-    let mut text = format!("{:16}{head}\n", "");
-    for row in rows {
-        let cells = [
-            cell(row.ate_cm, 3, WIDTH),
-            cell(row.length_error_percent, 1, WIDTH),
-            cell(row.direction_percent, 0, WIDTH),
-            cell(row.impossible, 0, WIDTH),
-            cell(row.reversing_percent, 0, WIDTH),
-            cell(row.lost, 0, WIDTH),
-        ];
-        text += &format!("{:16}{}\n", row.name, cells.concat());
-    }
-    text
+    let figures = |row: &Row| {
+        [
+            (row.ate_cm, 3),
+            (row.length_error_percent, 1),
+            (row.direction_percent, 0),
+            (row.impossible, 0),
+            (row.reversing_percent, 0),
+            (row.lost, 0),
+        ]
+    };
+    repeats::table(head, rows.iter().map(|row| (row.name, figures(row))))
 }

@@ -83,6 +83,10 @@ fn exposure_times_that_the_motion_contradicts_are_named() {
     fs::remove_file(place.path("shaken/imu.csv")).unwrap();
     let right = run(&place, "track", "right", &[]);
     assert_eq!(warnings(&right), [""; 0]);
+    // A map that takes every frame for sharp says nothing about exposures.
+    let tracked = place.path("right").display().to_string();
+    let options = ["--trajectory", &tracked, "--blur", "off", "--time-budget", "1"];
+    assert_eq!(warnings(&run(&place, "map", "sharp", &options)), [""; 0]);
     place.edit("shaken/calibration.toml", "exposure_seconds = 0.016", "exposure_seconds = 0.008");
     let wrong = run(&place, "track", "wrong", &[]);
     let [said] = warnings(&wrong)[..] else { panic!("{:?}", warnings(&wrong)) };

@@ -27,6 +27,10 @@ const DEPTH_SAMPLES: usize = 8;
 /// say.
 const TELLING_EXPOSURE: f64 = 0.15;
 
+/// Seconds below which the motion within an exposure is that of a frame that was taken for sharp, but for rounding: no
+/// calibration may state as little.
+const TAKEN_FOR_SHARP: f64 = 1e-6;
+
 /// Share of the length of a metre that is worth telling.
 const TELLING_METRE: f64 = 0.01;
 
@@ -144,7 +148,10 @@ fn exposure(dataset: &Dataset, tracked: &[Tracked]) -> Option<Contradiction> {
     let scale = PixelScale::new(&dataset.calibration().camera, survey(dataset, DEPTH_SAMPLES).median_depth?);
     let interval = 1.0 / dataset.calibration().frame_rate;
     let times: Vec<f64> = (0..dataset.len()).map(|index| dataset.exposure_seconds(index)).collect();
-    let found = factor(&observations(tracked, &scale, interval), &times)?;
+    let mut observations = observations(tracked, &scale, interval);
+    // A frame that was taken for sharp, as all are where blur is not modelled, does not say how long its exposure was.
+    observations.retain(|(_, seconds, _)| seconds.abs() >= TAKEN_FOR_SHARP);
+    let found = factor(&observations, &times)?;
     let recorded = median(&times)?;
     let is_telling = found.median > 0.0
         && found.median.ln().abs() > TELLING_EXPOSURE

@@ -11,10 +11,12 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::depth_problem::DepthProblem;
 use crate::geometry::RigidTransform;
-use crate::surface::spread_limit;
 
 /// Points of a block.
 pub(super) const LANES: usize = 8;
+
+/// `0, 1, 2...`
+const ORDINALS: [f32; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 /// Least distance in front of the keyframe, metres.
 const MIN_Z: f32 = 0.05;
@@ -62,10 +64,17 @@ impl<'a> DepthSampler<'a> {
             let row = &map.values[v * map.width..][..map.width];
             for first in (0..map.width).step_by(LANES * stride) {
                 let at = |lane: usize| first + lane * stride;
-                let rho = f32x8::from_fn(simd, |lane| row.get(at(lane)).copied().unwrap_or(0.0));
+                let rho = match (stride, row.get(first..first + LANES * stride)) {
+                    (2, Some(run)) => {
+                        let [low, high] = [0, LANES].map(|k| f32x8::from_slice(simd, &run[k..k + LANES]));
+                        low.unzip_low(high)
+                    }
+                    (_, Some(run)) => f32x8::from_fn(simd, |lane| run[lane * stride]),
+                    _ => f32x8::from_fn(simd, |lane| row.get(at(lane)).copied().unwrap_or(0.0)),
+                };
                 let measured = rho.simd_gt(0.0);
                 if measured.any_true() {
-                    let u = f32x8::from_fn(simd, |lane| at(lane) as f32);
+                    let u = f32x8::from_slice(simd, &ORDINALS) * stride as f32 + first as f32;
                     visit(&self.compare(simd, u, v as f32, rho, measured));
                 }
             }
@@ -128,32 +137,16 @@ impl<'a> DepthSampler<'a> {
         kv: f32x8<S>,
     ) -> (mask32x8<S>, f32x8<S>, [f32x8<S>; 3]) {
         let (map, planes) = (self.problem.keyframe, self.problem.planes);
-        let width = map.width;
-        let last = [(width - 1) as f32, (map.height - 1) as f32];
-        let inside = lanes & ku.simd_ge(0.0) & kv.simd_ge(0.0) & ku.simd_lt(last[0]) & kv.simd_lt(last[1]);
+        let (seen, surface) = map.sample_lanes(simd, lanes, ku, kv);
         let zero = f32x8::splat(simd, 0.0);
-        // Lanes outside look at the first pixel.
-        let (ku, kv) = (inside.select(ku, zero), inside.select(kv, zero));
-        let (i, j) = (ku.to_int::<i32x8<S>>(), kv.to_int::<i32x8<S>>());
-        let (fu, fv) = (ku - i.to_float::<f32x8<S>>(), kv - j.to_float::<f32x8<S>>());
-        let (i, j) = (i.as_slice(), j.as_slice());
-        let corner = |dv: usize, du: usize| {
-            f32x8::from_fn(simd, |lane| map.values[(j[lane] as usize + dv) * width + i[lane] as usize + du])
-        };
-        let (top, bottom) = ([corner(0, 0), corner(0, 1)], [corner(1, 0), corner(1, 1)]);
-        let low = top[0].min(top[1]).min(bottom[0].min(bottom[1]));
-        let high = top[0].max(top[1]).max(bottom[0].max(bottom[1]));
-        // The limit is linear in the inverse depth.
-        let limit = low * (spread_limit(1.0) - spread_limit(0.0)) + spread_limit(0.0);
-        let seen = inside & low.simd_gt(0.0) & (high - low).simd_lt(limit);
-        let t0 = top[0] + fu * (top[1] - top[0]);
-        let t1 = bottom[0] + fu * (bottom[1] - bottom[0]);
-        let surface = t0 + fv * (t1 - t0);
-        let (nearest_u, nearest_v) = ((ku + 0.5).to_int::<i32x8<S>>(), (kv + 0.5).to_int::<i32x8<S>>());
-        let (nearest_u, nearest_v) = (nearest_u.as_slice(), nearest_v.as_slice());
-        let plane = [&*planes.value, &*planes.slope_u, &*planes.slope_v].map(|values: &[f32]| {
-            f32x8::from_fn(simd, |lane| values[nearest_v[lane] as usize * width + nearest_u[lane] as usize])
-        });
+        let nearest = |x: f32x8<S>| (seen.select(x, zero) + 0.5).to_int::<i32x8<S>>();
+        let index = nearest(kv) * i32x8::splat(simd, map.width as i32) + nearest(ku);
+        let index = index.as_slice();
+        // Equal lengths, so that one bounds check serves all three.
+        let value = &*planes.value;
+        let slopes = [&planes.slope_u[..value.len()], &planes.slope_v[..value.len()]];
+        let plane = [value, slopes[0], slopes[1]]
+            .map(|values: &[f32]| f32x8::from_fn(simd, |lane| values[index[lane] as u32 as usize]));
         (seen, surface, plane)
     }
 }

@@ -56,7 +56,7 @@ pub struct LevelOutcome {
     /// Depth points that took part.
     pub depth_points: usize,
     /// How far picture and depth are apart about the pose: the square of their difference over what their noise explains,
-    /// 1 on average where only noise sets them apart; 0 without depth term.
+    /// 1 on average where only noise sets them apart; 0 without depth term and on other levels than the finest.
     pub disagreement: f64,
     /// Gauss-Newton matrix at the estimate in (centre, motion, gain, offset) coordinates; where the bow is an unknown
     /// too, for any bow.
@@ -231,8 +231,10 @@ fn stopped(
     outcome: &mut LevelOutcome,
     reason: StopReason,
 ) -> Descent {
-    let timing = &objective.frame.timing;
-    outcome.disagreement = disagreement(at, &outcome.estimate, timing.depth_time);
+    outcome.information = without_bow(&at.hessian);
+    if objective.level == 0 {
+        outcome.disagreement = disagreement(at, &outcome.estimate, objective.frame.timing.depth_time);
+    }
     Descent::Stopped(reason)
 }
 
@@ -285,7 +287,6 @@ fn descend(
     outcome.work += objective.work();
     let mut moved = 0.0;
     loop {
-        outcome.information = without_bow(&at.hessian);
         outcome.depth_points = at.depth_points as usize;
         let Some(step) = damping.step(&at.hessian, &at.gradient) else {
             return stopped(&at, objective, outcome, StopReason::Singular);
@@ -311,6 +312,7 @@ fn descend(
             at = next;
             moved += pixels;
             if moved > REPLACE_AFTER && outcome.iterations < plan.max_iterations {
+                outcome.information = without_bow(&at.hessian);
                 return Descent::Moved;
             }
         } else if !damping.reject() {

@@ -119,11 +119,25 @@ fn block_sums<S: Simd, const INSIDE: bool>(
     v: usize,
 ) -> [f32x8<S>; BLOCK_HEIGHT] {
     let mut sums = [f32x8::splat(simd, 0.0); BLOCK_HEIGHT];
+    // Pixels from the first that a tap reads to the last.
+    let span = BLOCK_HEIGHT * flow.width + BLOCK_WIDTH + 1;
     for k in 0..taps.count {
         let (left, top) = (u as i32 + taps.du[k], v as i32 + taps.dv[k]);
-        let mut above = mixed_row::<S, INSIDE>(simd, image, flow, left, top, taps.fu[k]);
+        if INSIDE || tap_is_inside(flow, left, top) {
+            let first = (top as u32 as usize).wrapping_mul(flow.width).wrapping_add(left as u32 as usize);
+            let mut rows = &image[first..][..span];
+            let mut above = mixed(simd, &rows[..=BLOCK_WIDTH], taps.fu[k]);
+            for sum in &mut sums {
+                rows = &rows[flow.width..];
+                let below = mixed(simd, &rows[..=BLOCK_WIDTH], taps.fu[k]);
+                *sum += (below - above).mul_add(taps.fv[k], above);
+                above = below;
+            }
+            continue;
+        }
+        let mut above = mixed_row(simd, image, flow, left, top, taps.fu[k]);
         for (row, sum) in (top + 1..).zip(&mut sums) {
-            let below = mixed_row::<S, INSIDE>(simd, image, flow, left, row, taps.fu[k]);
+            let below = mixed_row(simd, image, flow, left, row, taps.fu[k]);
             *sum += (below - above).mul_add(taps.fv[k], above);
             above = below;
         }
@@ -131,9 +145,9 @@ fn block_sums<S: Simd, const INSIDE: bool>(
     sums
 }
 
-/// Eight pixels from `(left, top)` on, mixed with `fraction` of their right neighbours.
+/// Eight pixels from `(left, top)` on, mixed with `fraction` of their right neighbours; the border is continued.
 #[inline(always)]
-fn mixed_row<S: Simd, const INSIDE: bool>(
+fn mixed_row<S: Simd>(
     simd: S,
     image: &[f32],
     flow: &BlurFlow,
@@ -141,10 +155,6 @@ fn mixed_row<S: Simd, const INSIDE: bool>(
     top: i32,
     fraction: f32,
 ) -> f32x8<S> {
-    if INSIDE {
-        let first = top as usize * flow.width + left as usize;
-        return mixed(simd, &image[first..][..BLOCK_WIDTH + 1], fraction);
-    }
     let row = &image[top.clamp(0, flow.height as i32 - 1) as usize * flow.width..][..flow.width];
     if left >= 0 && left as usize + BLOCK_WIDTH < flow.width {
         return mixed(simd, &row[left as usize..][..BLOCK_WIDTH + 1], fraction);
@@ -166,15 +176,18 @@ fn mixed<S: Simd>(simd: S, pixels: &[f32], fraction: f32) -> f32x8<S> {
 /// Whether every load of the block stays in the image. The path is straight: its ends decide.
 #[inline(always)]
 fn path_is_inside(taps: &Taps, flow: &BlurFlow, u: usize, v: usize) -> bool {
-    let inside = |k: usize| {
-        let (left, top) = (u as i32 + taps.du[k], v as i32 + taps.dv[k]);
-        left >= 0
-            && top >= 0
-            && left + (BLOCK_WIDTH as i32) < flow.width as i32
-            && top + (BLOCK_HEIGHT as i32) < flow.height as i32
-    };
+    let inside = |k: usize| tap_is_inside(flow, u as i32 + taps.du[k], v as i32 + taps.dv[k]);
     let whole = u + BLOCK_WIDTH <= flow.width && v + BLOCK_HEIGHT <= flow.height;
     whole && inside(0) && inside(taps.count - 1)
+}
+
+/// Whether every load of a tap whose first pixel is `(left, top)` stays in the image.
+#[inline(always)]
+fn tap_is_inside(flow: &BlurFlow, left: i32, top: i32) -> bool {
+    left >= 0
+        && top >= 0
+        && left + (BLOCK_WIDTH as i32) < flow.width as i32
+        && top + (BLOCK_HEIGHT as i32) < flow.height as i32
 }
 
 #[cfg(test)]

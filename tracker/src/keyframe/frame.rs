@@ -142,10 +142,10 @@ impl<'m> Keyframe<'m> {
     ) {
         if timing.depth_readout == 0.0 {
             let keyframe_from_depth = keyframe_from_camera.at(0.5 + timing.depth_time);
-            fuse_depth(&mut self.depth, self.weights, current, &keyframe_from_depth, camera);
+            fuse_depth(level, &mut self.depth, self.weights, current, &keyframe_from_depth, camera);
         } else {
             let (depth, weights) = (&mut self.depth, &mut *self.weights);
-            fuse_rolling_depth(depth, weights, current, keyframe_from_camera, timing, camera);
+            fuse_rolling_depth(level, depth, weights, current, keyframe_from_camera, timing, camera);
         }
         self.fusions += 1;
         if self.fusions > 1 && self.fusions.is_power_of_two() {

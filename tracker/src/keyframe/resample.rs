@@ -2,8 +2,9 @@
 //!
 //! # Layout
 //!
-//! Shifts are known at the nodes of a lattice, the pixels of a coarser pyramid level. Per tile of 64 pixels the lattice is
-//! interpolated between its rows first, then along them; one sample of the image per SIMD lane.
+//! Shifts are known at the nodes of a lattice, the pixels of a coarser pyramid level. Tiles are 64 columns from top to bottom:
+//! the lattice is interpolated along its rows first, once for all rows of the image between two of its own, then between
+//! them; one sample of the image per SIMD lane.
 //!
 //! # Cost
 //!
@@ -34,51 +35,78 @@ impl Shifts<'_> {
         (first, at - first as f32)
     }
 
-    /// Fills the shifts of the pixels from `(u, v)` on. Nodes after the last one repeat it.
+    /// Fills the shifts of the pixels of `tile` in node row `j`.
     #[inline(always)]
-    fn fill(&self, u: usize, v: usize, du: &mut [f32; TILE], dv: &mut [f32; TILE]) {
-        let (j, fv) = self.node(v, self.height);
-        let above = &self.at_nodes[j * self.width..][..self.width];
-        let below = &self.at_nodes[(j + 1).min(self.height - 1) * self.width..][..self.width];
-        let (first, _) = self.node(u, self.width);
-        // A node per pixel at the most, and one on either side.
-        let mut between = [[0.0f32; 2]; TILE + 2];
-        let nodes = (TILE >> self.level) + 2;
-        for (k, shift) in between[..nodes.min(TILE + 2)].iter_mut().enumerate() {
-            let i = (first + k).min(self.width - 1);
-            *shift = core::array::from_fn(|axis| above[i][axis] + fv * (below[i][axis] - above[i][axis]));
-        }
-        for k in 0..TILE {
-            let (i, fu) = self.node(u + k, self.width);
-            let place = (i - first).min(TILE);
-            let (left, right) = (between[place], between[place + 1]);
-            du[k] = left[0] + fu * (right[0] - left[0]);
-            dv[k] = left[1] + fu * (right[1] - left[1]);
+    fn fill_row(&self, tile: &TileColumns, j: usize, row: &mut TileShifts) {
+        let nodes = &self.at_nodes[j.min(self.height - 1) * self.width..][..self.width];
+        let columns = tile.node.iter().zip(&tile.fraction);
+        for ((du, dv), (&node, &fraction)) in row.du.iter_mut().zip(&mut row.dv).zip(columns) {
+            // Nodes after the last one repeat it.
+            let (left, right) = (nodes[node], nodes[(node + 1).min(self.width - 1)]);
+            *du = left[0] + fraction * (right[0] - left[0]);
+            *dv = left[1] + fraction * (right[1] - left[1]);
         }
     }
 }
 
+/// Where the pixels of a tile lie among the columns of the lattice.
+struct TileColumns {
+    node: [usize; TILE],
+    fraction: [f32; TILE],
+}
+
+impl TileColumns {
+    #[inline(always)]
+    fn new(shifts: &Shifts, u: usize) -> Self {
+        let mut columns = Self { node: [0; TILE], fraction: [0.0; TILE] };
+        for (k, (node, fraction)) in columns.node.iter_mut().zip(&mut columns.fraction).enumerate() {
+            (*node, *fraction) = shifts.node(u + k, shifts.width);
+        }
+        columns
+    }
+}
+
+/// Shifts of the pixels of a tile in one row.
+#[derive(Clone, Copy)]
+struct TileShifts {
+    du: [f32; TILE],
+    dv: [f32; TILE],
+}
+
 /// Writes to `out` the image at every pixel plus its shift, both interpolated bilinearly; the border is continued.
 pub(super) fn resample(level: Level, image: &LevelImage, shifts: &Shifts, out: &mut [f32]) {
-    dispatch!(level, simd => resample_rows(simd, image, shifts, out));
+    dispatch!(level, simd => resample_tiles(simd, image, shifts, out));
 }
 
 #[inline(always)]
-fn resample_rows<S: Simd>(simd: S, image: &LevelImage, shifts: &Shifts, out: &mut [f32]) {
+fn resample_tiles<S: Simd>(simd: S, image: &LevelImage, shifts: &Shifts, out: &mut [f32]) {
     let Some(sampler) = BilinearSampler::new(simd, image) else { return };
     let (last_u, last_v) = ((image.width - 1) as f32, (image.height - 1) as f32);
-    let (mut du, mut dv, mut light) = ([0.0; TILE], [0.0; TILE], [0.0; TILE]);
-    for (v, row) in out.chunks_exact_mut(image.width).enumerate() {
-        for (tile, pixels) in row.chunks_mut(TILE).enumerate() {
-            shifts.fill(tile * TILE, v, &mut du, &mut dv);
-            for k in (0..TILE).step_by(S::f32s::LEN) {
-                let u = S::f32s::from_fn(simd, |lane| (tile * TILE + k + lane) as f32);
-                let u = (u + S::f32s::from_slice(simd, &du[k..k + S::f32s::LEN])).max(0.0).min(last_u);
-                let y = S::f32s::from_slice(simd, &dv[k..k + S::f32s::LEN]) + v as f32;
-                let cell = sampler.locate(u, y.max(0.0).min(last_v));
-                sampler.sample(&cell).value.store_slice(&mut light[k..k + S::f32s::LEN]);
+    let load = |values: &[f32; TILE], k: usize| S::f32s::from_slice(simd, &values[k..k + S::f32s::LEN]);
+    let empty = TileShifts { du: [0.0; TILE], dv: [0.0; TILE] };
+    let mut light = [0.0; TILE];
+    for left in (0..image.width).step_by(TILE) {
+        let columns = TileColumns::new(shifts, left);
+        // The rows of the lattice above and below the row of the image; they change every few rows.
+        let (mut above, mut below, mut filled) = (empty, empty, None);
+        for (v, row) in out.chunks_exact_mut(image.width).enumerate() {
+            let (j, fv) = shifts.node(v, shifts.height);
+            if filled != Some(j) {
+                shifts.fill_row(&columns, j, &mut above);
+                shifts.fill_row(&columns, j + 1, &mut below);
+                filled = Some(j);
             }
-            pixels.copy_from_slice(&light[..pixels.len()]);
+            for k in (0..TILE).step_by(S::f32s::LEN) {
+                let [du, dv] = [(&above.du, &below.du), (&above.dv, &below.dv)].map(|(above, below)| {
+                    let above = load(above, k);
+                    above + (load(below, k) - above) * fv
+                });
+                let u = S::f32s::from_fn(simd, |lane| (left + k + lane) as f32) + du;
+                let (u, y) = (u.max(0.0).min(last_u), (dv + v as f32).max(0.0).min(last_v));
+                sampler.sample(&sampler.locate(u, y)).value.store_slice(&mut light[k..k + S::f32s::LEN]);
+            }
+            let right = (left + TILE).min(image.width);
+            row[left..right].copy_from_slice(&light[..right - left]);
         }
     }
 }

@@ -80,6 +80,9 @@ pub fn typical_inverse_depth(keypoints: &[Keypoint]) -> f64 {
     keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
 }
 
+/// Pixels whose gradients are computed at once, so that the compiler makes vectors of them.
+const RUN: usize = 8;
+
 /// The pixel of a cell with the largest whitened gradient, if it is strong enough.
 fn strongest(
     image: &LevelImage,
@@ -91,16 +94,34 @@ fn strongest(
     let mut best = None;
     let mut best_squared = settings.min_strength * settings.min_strength;
     for v in rows {
-        let row = &image.pixels[v * w..][..w];
-        let above = &image.pixels[(v - 1) * w..][..w];
-        let below = &image.pixels[(v + 1) * w..][..w];
-        for u in columns.clone() {
-            let (gu, gv) = (0.5 * (row[u + 1] - row[u - 1]), 0.5 * (below[u] - above[u]));
+        // The pixels of the cell's row, and their neighbours.
+        let around =
+            |row: usize, shift: usize| &image.pixels[row * w + columns.start + shift - 1..][..columns.len()];
+        let (centre, left, right) = (around(v, 1), around(v, 0), around(v, 2));
+        let (above, below) = (around(v - 1, 1), around(v + 1, 1));
+        let squared = |k: usize| {
+            let (gu, gv) = (0.5 * (right[k] - left[k]), 0.5 * (below[k] - above[k]));
             // Photon noise grows with the light: gradients are compared in units of it.
-            let squared = (gu * gu + gv * gv) / (row[u] + settings.dark_intensity);
-            if squared > best_squared {
-                best_squared = squared;
-                best = Some((u, v));
+            (gu * gu + gv * gv) / (centre[k] + settings.dark_intensity)
+        };
+        for first in (0..columns.len()).step_by(RUN) {
+            let run = first..(first + RUN).min(columns.len());
+            if run.len() < RUN {
+                for k in run {
+                    let strength = squared(k);
+                    if strength > best_squared {
+                        (best_squared, best) = (strength, Some((columns.start + k, v)));
+                    }
+                }
+                continue;
+            }
+            // Few runs have a stronger pixel than those before: which one it is, is looked up only then.
+            let strengths: [f32; RUN] = core::array::from_fn(|k| squared(first + k));
+            let largest = strengths.iter().fold(0.0f32, |a, &b| if b > a { b } else { a });
+            if largest > best_squared
+                && let Some(k) = strengths.iter().position(|&strength| strength == largest)
+            {
+                (best_squared, best) = (largest, Some((columns.start + first + k, v)));
             }
         }
     }

@@ -126,7 +126,10 @@ impl Tracker<'_> {
         mem::swap(&mut self.span, &mut self.keyframe_span);
         self.rectify.capture(keyframe.pyramid.levels[0].pixels, keyframe.depth.values);
         self.deblur.capture(keyframe.pyramid.levels[0].pixels);
-        keyframe.restart_surface(self.simd);
+        // Its planes say how blur moves; those of a picture that stays as it is are fitted when it has been given one time.
+        if sharpness == Sharpness::Deblurred {
+            keyframe.restart_surface(self.simd);
+        }
         self.set_keyframe_path(path, sharpness);
     }
 }

@@ -181,7 +181,7 @@ impl Tracker<'_> {
         let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
         self.keyframe.keyframe_from_camera = Some(path);
         self.keyframe.blur = self.blur_length(&exposure_of(&path, &self.keyframe.timing));
-        self.rectify.move_depth(&moved, &self.config.camera, &mut self.keyframe.depth);
+        self.rectify.move_depth(self.simd, &moved, &self.config.camera, &mut self.keyframe.depth);
         self.keyframe.refit_surface(self.simd);
         let change = exposure_of(&path, &self.keyframe.timing).motion() - self.deblurred_with;
         if self.blur_length(&ExposureTrajectory::from_mid_and_motion(&mid, &change)) > DEBLUR_CHANGE {

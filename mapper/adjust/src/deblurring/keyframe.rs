@@ -191,7 +191,8 @@ impl KeyframeDeblurrer {
         map.fill(self.simd, &raw, self.metres_per_unit);
         if self.rolls() {
             let depth_time = 0.5 + path.timing.depth_time;
-            rectify.move_depth(&path.reference_from_camera.at(depth_time), &self.camera, &mut map);
+            let camera_then = path.reference_from_camera.at(depth_time);
+            rectify.move_depth(self.simd, &camera_then, &self.camera, &mut map);
         }
         planes.fit(self.simd, &map);
         Ok(Surface { map, planes })

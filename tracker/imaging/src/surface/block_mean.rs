@@ -1,6 +1,6 @@
 //! Block means of a raw depth map.
 
-use fearless_simd::{Level, dispatch, f32x8, prelude::*};
+use fearless_simd::{Level, dispatch, f32x8, f64x4, i32x8, mask32x8, prelude::*};
 
 use crate::geometry::PinholeCamera;
 use crate::image::DepthView;
@@ -27,7 +27,17 @@ pub struct InverseDepthMap<'m> {
 #[inline]
 #[must_use]
 pub fn spread_limit(rho: f32) -> f32 {
-    0.015 + 0.04 * rho
+    SPREAD_FLOOR + SPREAD_SLOPE * rho
+}
+
+/// See [`spread_limit`].
+const SPREAD_FLOOR: f32 = 0.015;
+const SPREAD_SLOPE: f32 = 0.04;
+
+/// [`spread_limit`] around eight values.
+#[inline(always)]
+pub fn spread_limits<S: Simd>(rho: f32x8<S>) -> f32x8<S> {
+    rho * SPREAD_SLOPE + SPREAD_FLOOR
 }
 
 impl<'m> InverseDepthMap<'m> {
@@ -108,6 +118,53 @@ impl<'m> InverseDepthMap<'m> {
         let t1 = bottom[0] + fu * (bottom[1] - bottom[0]);
         Some(t0 + fv * (t1 - t0))
     }
+
+    /// [`Self::sample`] at eight places, of which only `lanes` count: those of them that have a value, and the values. Lanes
+    /// without one hold some number.
+    ///
+    /// Per lane two loads of adjacent pairs.
+    #[inline(always)]
+    pub fn sample_lanes<S: Simd>(
+        &self,
+        simd: S,
+        lanes: mask32x8<S>,
+        u: f32x8<S>,
+        v: f32x8<S>,
+    ) -> (mask32x8<S>, f32x8<S>) {
+        let limit = [(self.width - 1) as f32, (self.height - 1) as f32];
+        let inside = lanes & u.simd_ge(0.0) & v.simd_ge(0.0) & u.simd_lt(limit[0]) & v.simd_lt(limit[1]);
+        // Lanes outside look at the first pixel.
+        let zero = f32x8::splat(simd, 0.0);
+        let (u, v) = (inside.select(u, zero), inside.select(v, zero));
+        let (i, j) = (u.to_int::<i32x8<S>>(), v.to_int::<i32x8<S>>());
+        let (fu, fv) = (u - i.to_float::<f32x8<S>>(), v - j.to_float::<f32x8<S>>());
+        let index = j * i32x8::splat(simd, self.width as i32) + i;
+        // Equal lengths, so that one bounds check serves both.
+        let cells = self.width * (self.height - 1);
+        let (above, below) = (&self.values[..cells], &self.values[self.width..][..cells]);
+        let (top, bottom) = (pairs(simd, above, &index), pairs(simd, below, &index));
+        // All four have to be measured and of one surface.
+        let low = top[0].min(top[1]).min(bottom[0].min(bottom[1]));
+        let high = top[0].max(top[1]).max(bottom[0].max(bottom[1]));
+        let seen = inside & low.simd_gt(0.0) & (high - low).simd_lt(spread_limits(low));
+        let t0 = top[0] + fu * (top[1] - top[0]);
+        let t1 = bottom[0] + fu * (bottom[1] - bottom[0]);
+        (seen, t0 + fv * (t1 - t0))
+    }
+}
+
+/// The values at `index` and those after them.
+#[inline(always)]
+fn pairs<S: Simd>(simd: S, values: &[f32], index: &i32x8<S>) -> [f32x8<S>; 2] {
+    let index = index.as_slice();
+    let pair = |lane: usize| {
+        let first = index[lane] as u32 as usize;
+        let pair = &values[first..first + 2];
+        bytemuck::cast::<[f32; 2], f64>([pair[0], pair[1]])
+    };
+    let low: f32x8<S> = f64x4::from_fn(simd, pair).bitcast();
+    let high: f32x8<S> = f64x4::from_fn(simd, |lane| pair(4 + lane)).bitcast();
+    [low.unzip_low(high), low.unzip_high(high)]
 }
 
 /// [`block_mean`] of the eight blocks from `(u, v)` on.
@@ -140,10 +197,8 @@ fn block_means<S: Simd>(
     // The extremes in inverse metres: the nearest value has the largest.
     let per_metre = f32x8::splat(simd, 1.0 / metres_per_unit);
     let (high, low) = (per_metre / nearest, per_metre / farthest.max(1.0));
-    // The limit is linear in the inverse depth.
-    let limit = low * (spread_limit(1.0) - spread_limit(0.0)) + spread_limit(0.0);
     let enough = count.simd_gt(0.0) & (count * 2.0).simd_ge((block * block) as f32);
-    let kept = enough & (high - low).simd_le(limit);
+    let kept = enough & (high - low).simd_le(spread_limits(low));
     kept.select(sum * per_metre / count.max(1.0), zero)
 }
 
@@ -237,5 +292,38 @@ mod tests {
         {
             assert_eq!(map.sample(u, v), None, "({u}, {v})");
         }
+    }
+    #[test]
+    fn eight_samples_are_those_taken_one_by_one_at_every_instruction_set() {
+        let mut values: Vec<f32> =
+            (0..48).map(|k| 0.5 + 0.002 * (k % 8) as f32 - 0.001 * (k / 8) as f32).collect();
+        values[2 * 8 + 5] = 0.0;
+        values[4 * 8 + 2] = 0.9;
+        let map = InverseDepthMap { values: &mut values, width: 8, height: 6, level: 0 };
+        // From outside on one side to outside on the other, and what is no number.
+        let places: Vec<[f32; 2]> = (0..400)
+            .map(|k| [0.45 * (k % 20) as f32 - 0.7, 0.37 * (k / 20) as f32 - 0.6])
+            .chain([[f32::NAN, 1.0], [1.0, f32::INFINITY], [-1e30, 2.0]])
+            .collect();
+        for level in crate::simd::levels_up_to(Level::new()) {
+            for places in places.chunks(8) {
+                let sampled = dispatch!(level, simd => sampled_at(simd, &map, places));
+                for (place, lane) in places.iter().zip(sampled) {
+                    let name = crate::simd::level_name(level);
+                    let single = map.sample(place[0], place[1]);
+                    assert_eq!(lane.is_some(), single.is_some(), "{name} at {place:?}");
+                    let apart = lane.unwrap_or(0.0) - single.unwrap_or(0.0);
+                    assert!(apart.abs() < 1e-6, "{name} at {place:?}: {lane:?} and {single:?}");
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sampled_at<S: Simd>(simd: S, map: &InverseDepthMap, places: &[[f32; 2]]) -> [Option<f32>; 8] {
+        let axis = |i: usize| f32x8::from_fn(simd, |lane| places.get(lane).map_or(-5.0, |place| place[i]));
+        let all = f32x8::splat(simd, 1.0).simd_gt(0.0);
+        let (seen, values) = map.sample_lanes(simd, all, axis(0), axis(1));
+        core::array::from_fn(|lane| (seen.to_bitmask() >> lane & 1 == 1).then(|| values.as_slice()[lane]))
     }
 }

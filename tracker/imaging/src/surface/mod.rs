@@ -8,6 +8,6 @@ mod block_mean;
 mod fusion;
 mod planes;
 
-pub use block_mean::{InverseDepthMap, spread_limit};
-pub use fusion::{fuse_depth, fuse_measurement};
+pub use block_mean::{InverseDepthMap, spread_limit, spread_limits};
+pub use fusion::{fuse_depth, fuse_lanes, lanes_of, store_lanes};
 pub use planes::SurfacePlanes;

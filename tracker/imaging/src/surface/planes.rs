@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, dispatch, f32x8, prelude::*};
 
-use super::block_mean::{InverseDepthMap, spread_limit};
+use super::block_mean::{InverseDepthMap, spread_limit, spread_limits};
 use crate::geometry::PinholeCamera;
 use crate::workspace::{Arena, WorkspaceError};
 
@@ -126,8 +126,7 @@ fn fit_planes<S: Simd>(simd: S, map: &InverseDepthMap, index: usize) -> [f32x8<S
     let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
     let load = |at: usize| f32x8::from_slice(simd, &map.values[at..at + LANES]);
     let centre = load(index);
-    // The limit is linear in the inverse depth.
-    let limit = centre * (spread_limit(1.0) - spread_limit(0.0)) + spread_limit(0.0);
+    let limit = spread_limits(centre);
     let mut s = [zero; 6];
     let mut t = [zero; 3];
     for j in 0..WINDOW {

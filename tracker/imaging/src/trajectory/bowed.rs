@@ -18,6 +18,19 @@ pub struct BowedTrajectory {
     pub bow: Vector6<f64>,
 }
 
+/// A path at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct PathPoint {
+    /// See [`BowedTrajectory::at`].
+    pub pose: RigidTransform,
+    /// See [`ExposureTrajectory::rotation_blend_left`].
+    pub rotation_blend_left: Matrix3<f64>,
+    /// See [`BowedTrajectory::bow_blend_left`].
+    pub bow_blend_left: Matrix3<f64>,
+    /// See [`BowedTrajectory::velocity_left`].
+    pub velocity_left: Vector6<f64>,
+}
+
 impl BowedTrajectory {
     /// The path without acceleration.
     #[must_use]
@@ -53,21 +66,32 @@ impl BowedTrajectory {
     /// its factor `(s - 1/2)^2`.
     #[must_use]
     pub fn bow_blend_left(&self, s: f64) -> Matrix3<f64> {
-        let turn = self.turn(s);
-        self.linear.at(s).rotation_matrix() * so3::right_jacobian(&-turn)
+        self.point(s, &self.linear.rotation_vector()).bow_blend_left
     }
 
     /// Velocity at `s` per unit of s: translation in the reference frame, left rotation.
     #[must_use]
     pub fn velocity_left(&self, s: f64) -> Vector6<f64> {
+        self.point(s, &self.linear.rotation_vector()).velocity_left
+    }
+
+    /// All that is known of the path at `s`, for the rotation vector `omega` of its linear motion, which many times share.
+    #[must_use]
+    pub fn point(&self, s: f64, omega: &Vector3<f64>) -> PathPoint {
+        let height = (s - 0.5) * (s - 0.5);
+        let linear = self.linear.at_turned(s, omega);
         let slope = 2.0 * (s - 0.5);
-        let translation =
+        let shift =
             self.linear.end.translation - self.linear.start.translation + self.bow.fixed_rows::<3>(0) * slope;
-        let linear_turn = self.linear.start.rotation * self.linear.rotation_vector();
         // exp(x beta) turns about beta for every x.
-        let bow_turn = self.linear.at(s).rotation * self.bow.fixed_rows::<3>(3) * slope;
-        let turn = linear_turn + bow_turn;
-        Vector6::new(translation.x, translation.y, translation.z, turn.x, turn.y, turn.z)
+        let turn = self.linear.start.rotation * omega + linear.rotation * self.bow.fixed_rows::<3>(3) * slope;
+        let is_straight = self.bow == Vector6::zeros();
+        PathPoint {
+            pose: if is_straight { linear } else { linear.perturbed(&(self.bow * height)) },
+            rotation_blend_left: self.linear.rotation_blend_left_turned(s, omega),
+            bow_blend_left: linear.rotation_matrix() * so3::right_jacobian(&-self.turn(s)),
+            velocity_left: Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z),
+        }
     }
 
     /// The linear motion between the poses at `from` and `to`.

@@ -69,7 +69,12 @@ impl ExposureTrajectory {
     /// `reference_from_camera` at normalised time `s`; values outside `[0, 1]` extrapolate.
     #[must_use]
     pub fn at(&self, s: f64) -> RigidTransform {
-        let omega = self.rotation_vector();
+        self.at_turned(s, &self.rotation_vector())
+    }
+
+    /// [`Self::at`] for the [`Self::rotation_vector`] `omega`, which many times of one path share.
+    #[must_use]
+    pub(super) fn at_turned(&self, s: f64, omega: &Vector3<f64>) -> RigidTransform {
         RigidTransform {
             rotation: self.start.rotation * so3::exp(&(omega * s)),
             translation: self.start.translation * (1.0 - s) + self.end.translation * s,
@@ -95,7 +100,13 @@ impl ExposureTrajectory {
     /// of the reference frame.
     #[must_use]
     pub fn rotation_blend_left(&self, s: f64) -> Matrix3<f64> {
-        let omega = self.start.rotation * self.rotation_vector();
+        self.rotation_blend_left_turned(s, &self.rotation_vector())
+    }
+
+    /// [`Self::rotation_blend_left`] for the [`Self::rotation_vector`] `omega`.
+    #[must_use]
+    pub(super) fn rotation_blend_left_turned(&self, s: f64, omega: &Vector3<f64>) -> Matrix3<f64> {
+        let omega = self.start.rotation * omega;
         let (c1, c2) = blend_coefficients(omega.norm(), s);
         let w = so3::hat(&omega);
         Matrix3::identity() * s - w * c1 + w * w * c2

@@ -3,5 +3,5 @@
 mod bowed;
 mod exposure;
 
-pub use bowed::{BowedTrajectory, FrameTiming};
+pub use bowed::{BowedTrajectory, FrameTiming, PathPoint};
 pub use exposure::{ExposureTrajectory, SampleRule, left_from_right};

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::pattern::{PATCH_PIXELS, PATTERN_DU, PATTERN_DV};
 use crate::geometry::PinholeCamera;
-use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming, SampleRule};
+use crate::trajectory::{BowedTrajectory, ExposureTrajectory, FrameTiming, PathPoint, SampleRule};
 
 /// Upper bound of the virtual views of one exposure.
 pub const MAX_VIRTUAL_VIEWS: usize = 32;
@@ -49,21 +49,13 @@ impl VirtualView {
         }
     }
 
-    /// The view at normalised time `s` of a path with bow whose rows follow each other by `row_step` of normalised time.
+    /// The view at `point`, normalised time `s`, of a path with bow whose rows follow each other by `row_step` of normalised time.
     ///
     /// Within a patch that shears the pattern. The part of it that depends on the patch's depth takes that of a surface
     /// at `inverse_depth`: over the four rows of half a patch the difference is a hundredth of a pixel.
-    #[must_use]
-    pub fn of_row(
-        path: &BowedTrajectory,
-        s: f64,
-        camera: &PinholeCamera,
-        row_step: f64,
-        inverse_depth: f64,
-    ) -> Self {
-        let pose = path.at(s);
-        let rotation = pose.rotation_matrix();
-        let velocity = path.velocity_left(s);
+    fn of_row(point: &PathPoint, s: f64, camera: &PinholeCamera, row_step: f64, inverse_depth: f64) -> Self {
+        let rotation = point.pose.rotation_matrix();
+        let velocity = point.velocity_left;
         let (shift, turn) =
             (Vector3::from(velocity.fixed_rows::<3>(0)), Vector3::from(velocity.fixed_rows::<3>(3)));
         // Rows that come later see the keypoint moved on: (omega x R e_z + rho v) dt per row.
@@ -71,9 +63,9 @@ impl VirtualView {
         Self {
             pattern_offset: pattern_offset(&rotation, camera, &per_row),
             rotation: rows(&rotation),
-            position: single(&pose.translation),
-            blend_left: rows(&path.linear.rotation_blend_left(s)),
-            bow_blend_left: rows(&path.bow_blend_left(s)),
+            position: single(&point.pose.translation),
+            blend_left: rows(&point.rotation_blend_left),
+            bow_blend_left: rows(&point.bow_blend_left),
             velocity: [single(&shift), single(&turn)],
             time: s as f32,
         }
@@ -153,7 +145,11 @@ impl RowBand {
         let row_step = timing.readout / self.height as f64;
         let time = |k: usize| middle + timing.exposure * (SampleRule::Midpoint.time(k, count) - 0.5);
         views.clear();
-        views.extend((0..count).map(|k| VirtualView::of_row(path, time(k), camera, row_step, inverse_depth)));
+        let omega = path.linear.rotation_vector();
+        views.extend((0..count).map(|k| {
+            let s = time(k);
+            VirtualView::of_row(&path.point(s, &omega), s, camera, row_step, inverse_depth)
+        }));
     }
 }
 

@@ -66,10 +66,16 @@ impl<'a> DepthSampler<'a> {
                 let at = |lane: usize| first + lane * stride;
                 let rho = match (stride, row.get(first..first + LANES * stride)) {
                     (2, Some(run)) => {
-                        let [low, high] = [0, LANES].map(|k| f32x8::from_slice(simd, &run[k..k + LANES]));
-                        low.unzip_low(high)
+                        let (low, high) = (&run[..LANES], &run[LANES..2 * LANES]);
+                        f32x8::from_slice(simd, low).unzip_low(f32x8::from_slice(simd, high))
                     }
-                    (_, Some(run)) => f32x8::from_fn(simd, |lane| run[lane * stride]),
+                    (_, Some(run)) => {
+                        let mut strided = [0.0; LANES];
+                        for (value, cell) in strided.iter_mut().zip(run.chunks_exact(stride)) {
+                            *value = cell[0];
+                        }
+                        f32x8::from_slice(simd, &strided)
+                    }
                     _ => f32x8::from_fn(simd, |lane| row.get(at(lane)).copied().unwrap_or(0.0)),
                 };
                 let measured = rho.simd_gt(0.0);
@@ -139,14 +145,20 @@ impl<'a> DepthSampler<'a> {
         let (map, planes) = (self.problem.keyframe, self.problem.planes);
         let (seen, surface) = map.sample_lanes(simd, lanes, ku, kv);
         let zero = f32x8::splat(simd, 0.0);
-        let nearest = |x: f32x8<S>| (seen.select(x, zero) + 0.5).to_int::<i32x8<S>>();
-        let index = nearest(kv) * i32x8::splat(simd, map.width as i32) + nearest(ku);
-        let index = index.as_slice();
+        // The nearest pixel; lanes that see nothing look at the first.
+        let (nearest_u, nearest_v) = (seen.select(ku, zero) + 0.5, seen.select(kv, zero) + 0.5);
+        let width = i32x8::splat(simd, map.width as i32);
+        let index = nearest_v.to_int::<i32x8<S>>() * width + nearest_u.to_int::<i32x8<S>>();
         // Equal lengths, so that one bounds check serves all three.
         let value = &*planes.value;
-        let slopes = [&planes.slope_u[..value.len()], &planes.slope_v[..value.len()]];
-        let plane = [value, slopes[0], slopes[1]]
-            .map(|values: &[f32]| f32x8::from_fn(simd, |lane| values[index[lane] as u32 as usize]));
-        (seen, surface, plane)
+        let (slope_u, slope_v) = (&planes.slope_u[..value.len()], &planes.slope_v[..value.len()]);
+        let mut plane = [[0.0; LANES]; 3];
+        for (lane, &index) in index.as_slice().iter().enumerate() {
+            let at = index as u32 as usize;
+            (plane[0][lane], plane[1][lane], plane[2][lane]) = (value[at], slope_u[at], slope_v[at]);
+        }
+        let value = f32x8::from_slice(simd, &plane[0]);
+        let slope_u = f32x8::from_slice(simd, &plane[1]);
+        (seen, surface, [value, slope_u, f32x8::from_slice(simd, &plane[2])])
     }
 }

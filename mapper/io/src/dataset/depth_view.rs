@@ -1,5 +1,6 @@
 //! Depth images of another camera as the colour camera sees them.
 
+use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{Distortion, PinholeCamera, RigidTransform};
 use mba_tracker::image::{SourcePosition, fill_source_map, remap_nearest};
 use nalgebra::Vector3;
@@ -68,7 +69,7 @@ fn source_map(
 
 fn nearest(stored: &[u16], (width, height): (usize, usize), map: &[SourcePosition]) -> Vec<u16> {
     let mut target = vec![0; map.len()];
-    let mapped = remap_nearest(stored, width, height, map, &mut target);
+    let mapped = remap_nearest(SimdLevel::new(), stored, width, height, map, &mut target);
     debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
     target
 }

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::Path;
 
+use mba_tracker::SimdLevel;
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::image::{
     PixelRectangle, SourcePosition, fill_source_map, region_with_source, remap_bilinear, remap_nearest,
@@ -46,7 +47,7 @@ impl ColourSource {
         let Some(map) = &self.map else { return stored };
         let mut target = vec![[0; 3]; map.len()];
         let (pixels, _) = stored.as_chunks::<3>();
-        let mapped = remap_bilinear(pixels, self.size.0, self.size.1, map, &mut target);
+        let mapped = remap_bilinear(SimdLevel::new(), pixels, self.size.0, self.size.1, map, &mut target);
         debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
         target.into_flattened()
     }
@@ -55,7 +56,7 @@ impl ColourSource {
     pub(super) fn undistort_mask(&self, stored: Vec<u16>) -> Vec<u16> {
         let Some(map) = &self.map else { return stored };
         let mut target = vec![0; map.len()];
-        let mapped = remap_nearest(&stored, self.size.0, self.size.1, map, &mut target);
+        let mapped = remap_nearest(SimdLevel::new(), &stored, self.size.0, self.size.1, map, &mut target);
         debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
         target
     }

@@ -1,9 +1,9 @@
-//! Resampling a distorted image into an ideal pinhole image through a map of source positions.
+//! Where the light of an ideal pinhole image lies in a distorted one.
 //!
-//! The map is computed once per camera; every frame then only gathers. All memory is the caller's.
+//! The map is computed once per camera; every frame then only gathers ([`super::remap_bilinear`]). All memory is the
+//! caller's.
 
 use crate::geometry::{Distortion, PinholeCamera};
-use crate::math::{floor_to_i32, round_half_up_to_i32};
 
 /// Column and row, in pixels of the captured image, whose light belongs to one ideal pixel; [`NO_SOURCE`] or
 /// any other position outside `[0, width - 1] x [0, height - 1]` where the captured image has none.
@@ -63,59 +63,6 @@ pub fn fill_source_map(
         let inside = |p: f64, n: usize| p >= 0.0 && p + 1.0 <= n as f64;
         let seen = inside(u, captured.width) && inside(v, captured.height);
         *source = if seen { [u as f32, v as f32] } else { NO_SOURCE };
-    }
-    Ok(())
-}
-
-/// Gathers `target` from an interleaved 8-bit image of `width x height` pixels with bilinear interpolation,
-/// rounded to the nearest value; zero where the map has no source.
-///
-/// `source` holds `width * height` pixels, `target` one pixel per entry of `map`.
-///
-/// # Errors
-///
-/// [`BufferSizeError`] for the first of `source`, `target` with a wrong number of pixels.
-pub fn remap_bilinear<const CHANNELS: usize>(
-    source: &[[u8; CHANNELS]],
-    width: usize,
-    height: usize,
-    map: &[SourcePosition],
-    target: &mut [[u8; CHANNELS]],
-) -> Result<(), BufferSizeError> {
-    check_len(source.len(), width * height)?;
-    check_len(target.len(), map.len())?;
-    for (pixel, position) in target.iter_mut().zip(map) {
-        *pixel = match cell(*position, width, height) {
-            Some(cell) => interpolate(source, width, &cell),
-            None => [0; CHANNELS],
-        };
-    }
-    Ok(())
-}
-
-/// Gathers `target` from a 16-bit image of `width x height` pixels, taking the nearest source pixel: depths on
-/// both sides of an edge must never be mixed. Zero (missing) where the map has no source.
-///
-/// # Errors
-///
-/// [`BufferSizeError`] for the first of `source`, `target` with a wrong number of pixels.
-pub fn remap_nearest(
-    source: &[u16],
-    width: usize,
-    height: usize,
-    map: &[SourcePosition],
-    target: &mut [u16],
-) -> Result<(), BufferSizeError> {
-    check_len(source.len(), width * height)?;
-    check_len(target.len(), map.len())?;
-    for (value, position) in target.iter_mut().zip(map) {
-        *value = if has_source(*position, width, height) {
-            let column = round_half_up_to_i32(position[0]) as usize;
-            let row = round_half_up_to_i32(position[1]) as usize;
-            source[row * width + column]
-        } else {
-            0
-        };
     }
     Ok(())
 }
@@ -197,59 +144,9 @@ pub fn region_with_source(map: &[SourcePosition], width: usize) -> PixelRectangl
     region
 }
 
-/// Top-left pixel and fractions of one bilinear cell; the last row and column belong to the cell before.
-struct Cell {
-    column: usize,
-    row: usize,
-    right: usize,
-    below: usize,
-    fu: f32,
-    fv: f32,
-}
-
-fn check_len(found: usize, expected: usize) -> Result<(), BufferSizeError> {
+/// Whether a buffer has the number of elements that it should have.
+pub(super) fn check_len(found: usize, expected: usize) -> Result<(), BufferSizeError> {
     if found == expected { Ok(()) } else { Err(BufferSizeError { expected, found }) }
-}
-
-/// Written so that a NaN has no source.
-fn has_source([u, v]: SourcePosition, width: usize, height: usize) -> bool {
-    u >= 0.0 && v >= 0.0 && u + 1.0 <= width as f32 && v + 1.0 <= height as f32
-}
-
-fn cell(position: SourcePosition, width: usize, height: usize) -> Option<Cell> {
-    if !has_source(position, width, height) {
-        return None;
-    }
-    let column = floor_to_i32(position[0]) as usize;
-    let row = floor_to_i32(position[1]) as usize;
-    Some(Cell {
-        column,
-        row,
-        right: (column + 1).min(width - 1),
-        below: (row + 1).min(height - 1),
-        fu: position[0] - column as f32,
-        fv: position[1] - row as f32,
-    })
-}
-
-fn interpolate<const CHANNELS: usize>(
-    source: &[[u8; CHANNELS]],
-    width: usize,
-    cell: &Cell,
-) -> [u8; CHANNELS] {
-    let (above, below) = (cell.row * width, cell.below * width);
-    let corners = [
-        &source[above + cell.column],
-        &source[above + cell.right],
-        &source[below + cell.column],
-        &source[below + cell.right],
-    ];
-    core::array::from_fn(|channel| {
-        let [a, b, c, d] = corners.map(|pixel| f32::from(pixel[channel]));
-        let upper = a + cell.fu * (b - a);
-        let lower = c + cell.fu * (d - c);
-        (upper + cell.fv * (lower - upper) + 0.5) as u8
-    })
 }
 
 /// Squared radius, at unit depth, of the image corner farthest from the optical axis.
@@ -360,24 +257,6 @@ mod tests {
     }
 
     #[test]
-    fn bilinear_is_exact_on_a_ramp_and_black_without_source() {
-        let source: [[u8; 2]; 12] = core::array::from_fn(|i| [(10 * (i % 4)) as u8, (20 * (i / 4)) as u8]);
-        let map = [[0.26, 1.5], [3.0, 2.0], [2.74, 0.0], [3.01, 1.0], [f32::NAN, 1.0], NO_SOURCE];
-        let mut target = [[9; 2]; 6];
-        remap_bilinear(&source, 4, 3, &map, &mut target).unwrap();
-        assert_eq!(target, [[3, 30], [30, 40], [27, 0], [0, 0], [0, 0], [0, 0]]);
-    }
-
-    #[test]
-    fn depth_takes_the_nearest_pixel_and_never_a_mixture() {
-        let source = [1000, 5000, 0, 7000];
-        let map = [[0.49, 0.0], [0.5, 0.0], [0.3, 0.9], [1.0, 1.0], [-0.1, 0.0]];
-        let mut target = [1; 5];
-        remap_nearest(&source, 2, 2, &map, &mut target).unwrap();
-        assert_eq!(target, [1000, 5000, 0, 7000, 0]);
-    }
-
-    #[test]
     fn another_camera_rescales() {
         let captured = CAMERA;
         let ideal = CAMERA.at_level(1);
@@ -403,9 +282,5 @@ mod tests {
     fn wrong_buffers_are_errors() {
         let error = fill_source_map(&CAMERA, &CAMERA, &LENS, &mut [[0.0; 2]; 3]).unwrap_err();
         assert_eq!(error, BufferSizeError { expected: 307_200, found: 3 });
-        let map = [[0.0, 0.0]; 2];
-        assert!(remap_nearest(&[1, 2, 3], 2, 2, &map, &mut [0; 2]).is_err());
-        assert!(remap_nearest(&[1, 2, 3, 4], 2, 2, &map, &mut [0; 3]).is_err());
-        assert!(remap_bilinear(&[[1]; 4], 2, 2, &map, &mut [[0]; 1]).is_err());
     }
 }

@@ -156,14 +156,14 @@ impl<'m> InverseDepthMap<'m> {
 /// The values at `index` and those after them.
 #[inline(always)]
 fn pairs<S: Simd>(simd: S, values: &[f32], index: &i32x8<S>) -> [f32x8<S>; 2] {
-    let index = index.as_slice();
-    let pair = |lane: usize| {
-        let first = index[lane] as u32 as usize;
-        let pair = &values[first..first + 2];
-        bytemuck::cast::<[f32; 2], f64>([pair[0], pair[1]])
-    };
-    let low: f32x8<S> = f64x4::from_fn(simd, pair).bitcast();
-    let high: f32x8<S> = f64x4::from_fn(simd, |lane| pair(4 + lane)).bitcast();
+    let mut pairs = [0.0; LANES];
+    for (pair, &index) in pairs.iter_mut().zip(index.as_slice()) {
+        let first = index as u32 as usize;
+        let both = &values[first..first + 2];
+        *pair = bytemuck::cast::<[f32; 2], f64>([both[0], both[1]]);
+    }
+    let low: f32x8<S> = f64x4::from_slice(simd, &pairs[..LANES / 2]).bitcast();
+    let high: f32x8<S> = f64x4::from_slice(simd, &pairs[LANES / 2..]).bitcast();
     [low.unzip_low(high), low.unzip_high(high)]
 }
 

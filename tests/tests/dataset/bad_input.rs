@@ -181,7 +181,7 @@ fn absurd_calibrations_are_named_with_line_and_value() {
         (
             "frame_rate",
             "vignetting = [-1.5, 0.5]\nframe_rate",
-            "line 9: vignetting = [-1.5, 0.5], expected [a2, a4] with 1 + a2 r^2 + a4 r^4 above 0",
+            "line 9: vignetting = [-1.5, 0.5], expected [a2, a4], each from -10 to 10, with 1 + a2 r^2 + a4 r^4 above 0",
         ),
         (
             "frame_rate",

@@ -188,7 +188,7 @@ fn a_calibration_can_be_replaced() {
     let message = dataset.clone().with_calibration(absurd).unwrap_err().to_string();
     assert_eq!(
         message,
-        "the calibration is not valid: vignetting is [-1, 0], expected [a2, a4] with 1 + a2 r^2 + a4 r^4 above 0 \
+        "the calibration is not valid: vignetting is [-1, 0], expected [a2, a4], each from -10 to 10, with 1 + a2 r^2 + a4 r^4 above 0 \
          for r from 0 to 1"
     );
     let mut wider = better.clone();

@@ -311,11 +311,12 @@ impl Calibration {
         let Vignetting { a2, a4 } = self.vignetting;
         // Written so that NaN is refused.
         let is_lit = self.vignetting.least() > 0.0;
-        if !is_lit {
+        let is_lens = [a2, a4].iter().all(|part| part.abs() <= MAX_VIGNETTING);
+        if !(is_lit && is_lens) {
             return Err(InvalidValue {
                 key: "vignetting",
                 value: format!("[{a2}, {a4}]"),
-                expected: "[a2, a4] with 1 + a2 r^2 + a4 r^4 above 0 for r from 0 to 1",
+                expected: "[a2, a4], each from -10 to 10, with 1 + a2 r^2 + a4 r^4 above 0 for r from 0 to 1",
             });
         }
         match self.imu_from_camera {
@@ -327,6 +328,9 @@ impl Calibration {
         }
     }
 }
+
+/// Largest coefficient of a fall-off: the light of a lens that has lost all but a tenth in its corners needs 2.
+const MAX_VIGNETTING: f64 = 10.0;
 
 /// Checks an exposure time.
 pub(super) fn check_exposure(seconds: f64) -> Result<(), InvalidValue> {

@@ -313,6 +313,10 @@ impl<'a> Bits<'a> {
 
     /// Takes up to 16 bits; none if there are not as many.
     fn take(&mut self, length: u32) -> Option<u32> {
+        // With all 64 bits held, shifting them out for none would be shifting by their number.
+        if length == 0 {
+            return Some(0);
+        }
         self.count = self.count.checked_sub(length)?;
         Some((self.held >> self.count) as u32 & ((1 << length) - 1))
     }

@@ -58,6 +58,7 @@ impl Recording {
             depth: DepthView::new(&frame.depth, width, height, width)?,
             angular_velocity: None,
             gyro: None,
+            expected_path: None,
         })
     }
 }

@@ -117,6 +117,7 @@ impl RenderedFrame {
             depth: DepthView::new(&self.depth, width, height, width).expect("depth image"),
             angular_velocity: None,
             gyro: None,
+            expected_path: None,
         }
     }
 

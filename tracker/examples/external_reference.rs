@@ -46,6 +46,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             depth,
             angular_velocity: None,
             gyro: None,
+            expected_path: None,
         };
         let map_from_camera = tracker.track(&frame)?.world_from_camera;
 

@@ -27,6 +27,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             depth,
             angular_velocity: None,
             gyro: None,
+            expected_path: None,
         };
         let result = tracker.track(&frame)?;
 

@@ -38,6 +38,8 @@ pub enum FrameError {
         /// Exposure in seconds.
         got: f64,
     },
+    /// What is expected of the path is not finite, impossible for any camera, or its standard deviation below 0.
+    ExpectedPath,
 }
 
 impl fmt::Display for FrameError {
@@ -55,6 +57,7 @@ impl fmt::Display for FrameError {
             }
             Self::Pose => f.write_str("pose is not finite or its quaternion not of unit length"),
             Self::Exposure { got } => write!(f, "exposure of {got} s is not a duration"),
+            Self::ExpectedPath => f.write_str("the expected path is not that of a camera"),
         }
     }
 }

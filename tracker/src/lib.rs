@@ -42,6 +42,7 @@
 //!     depth: DepthView::new(&depth, 160, 120, 160)?,
 //!     angular_velocity: None,
 //!     gyro: None,
+//!     expected_path: None,
 //! })?;
 //! println!("{:?}: opened at {:?}", result.status, result.world_from_camera.start);
 //! # Ok::<(), Box<dyn core::error::Error>>(())
@@ -80,7 +81,7 @@ pub use mba_imaging::{geometry, image, math, photometric, simd, surface, traject
 pub use fearless_simd::Level as SimdLevel;
 pub use session::SessionError;
 pub use tracker::{
-    Doubt, Effort, Frame, FrameResult, FrameStatus, GyroReading, MAX_RECENT_KEYFRAMES, Readout,
+    Doubt, Effort, ExpectedPath, Frame, FrameResult, FrameStatus, GyroReading, MAX_RECENT_KEYFRAMES, Readout,
     ReferenceMode, ReferenceView, Revision, Tracker, TrackerConfig, WorkspacePlan, workspace_len,
 };
 pub use work::Work;

@@ -12,7 +12,7 @@ use crate::geometry::RigidTransform;
 use crate::trajectory::{BowedTrajectory, FrameTiming};
 
 /// What a saved session starts with: the version of its layout. On a machine of another byte order it is another number.
-const LAYOUT: u64 = 0x6d62_6173_6573_0001;
+const LAYOUT: u64 = 0x6d62_6173_6573_0002;
 
 /// A walk over the places of a session, which takes or fills them.
 pub(crate) struct Walk<'a> {
@@ -115,6 +115,7 @@ impl<'a> Walk<'a> {
         self.pose(&mut place.linear.start);
         self.pose(&mut place.linear.end);
         self.vector(&mut place.bow);
+        self.vector(&mut place.jerk);
     }
 
     /// Visits the times of a frame's parts.

@@ -4,8 +4,10 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform, so3};
 use mba_tracker::image::{ColourView, DepthView, PixelFormat, PixelRectangle};
 use mba_tracker::photometric::InverseResponse;
 use mba_tracker::simd::{Level, levels_up_to};
-use mba_tracker::{Effort, Frame, GyroReading, ReferenceMode, ReferenceView, Tracker, TrackerConfig};
-use nalgebra::Vector3;
+use mba_tracker::{
+    Effort, ExpectedPath, Frame, GyroReading, ReferenceMode, ReferenceView, Tracker, TrackerConfig,
+};
+use nalgebra::{Vector3, Vector6};
 
 use super::numbers::Numbers;
 use super::picture::Picture;
@@ -76,6 +78,19 @@ fn configuration(numbers: &mut Numbers<'_>) -> TrackerConfig {
     }
 }
 
+fn expected_path(numbers: &mut Numbers<'_>) -> ExpectedPath {
+    let mut derivative = |spread: f64| Vector6::from_fn(|_, _| numbers.near(0.0, spread));
+    let (velocity, acceleration, jerk) = (derivative(1.0), derivative(10.0), derivative(100.0));
+    let mut sigmas = |spread: f64| [0, 1].map(|_| numbers.near(spread, spread));
+    ExpectedPath {
+        velocity,
+        acceleration,
+        jerk,
+        velocity_sigma: sigmas(0.1),
+        acceleration_sigma: sigmas(3.0),
+    }
+}
+
 fn call(tracker: &mut Tracker<'_>, config: &TrackerConfig, time: &mut f64, numbers: &mut Numbers<'_>) {
     let (width, height) = (config.camera.width, config.camera.height);
     let what = numbers.below(20);
@@ -109,6 +124,7 @@ fn call(tracker: &mut Tracker<'_>, config: &TrackerConfig, time: &mut f64, numbe
                     angular_velocity: vector(numbers),
                     angular_acceleration: vector(numbers),
                 }),
+                expected_path: numbers.rarely(4).then(|| expected_path(numbers)),
             };
             let Ok(result) = tracker.track(&frame) else {
                 *time = frame.timestamp.clamp(-1e6, 1e6);

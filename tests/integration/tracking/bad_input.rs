@@ -4,8 +4,8 @@ use mba_tests::handheld::{camera_of_width, track_all, track_anew, tracker_config
 use mba_tracker::error::{ConfigError, FrameError};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, ExtentError, PixelFormat, PixelRectangle};
-use mba_tracker::{Frame, ReferenceView, SimdLevel, Tracker, TrackerConfig};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use mba_tracker::{ExpectedPath, Frame, ReferenceView, SimdLevel, Tracker, TrackerConfig};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
 
 use crate::scenes::SMALL;
 
@@ -87,11 +87,20 @@ fn refused(good: &Frame, previous: f64) -> Vec<(Frame<'static>, Expected)> {
         depth,
         angular_velocity: None,
         gyro: None,
+        expected_path: None,
     };
     let t = good.timestamp;
     let (c, d) = (colour(160, 120), depth(160, 120));
     let timestamp: Expected = |e| matches!(e, FrameError::Timestamp { .. });
     let exposure: Expected = |e| matches!(e, FrameError::Exposure { .. });
+    let path: Expected = |e| matches!(e, FrameError::ExpectedPath);
+    let impossible = |speed, sigma| ExpectedPath {
+        velocity: Vector6::repeat(speed),
+        acceleration: Vector6::zeros(),
+        jerk: Vector6::zeros(),
+        velocity_sigma: [sigma; 2],
+        acceleration_sigma: [1.0; 2],
+    };
     vec![
         (frame(t, 0.02, colour(320, 240), d), |e| {
             *e == FrameError::Size { expected: (160, 120), got: (320, 240) }
@@ -105,6 +114,9 @@ fn refused(good: &Frame, previous: f64) -> Vec<(Frame<'static>, Expected)> {
         (frame(f64::NAN, 0.02, c, d), timestamp),
         (frame(f64::INFINITY, 0.02, c, d), timestamp),
         (frame(t, -0.02, c, d), exposure),
+        (Frame { expected_path: Some(impossible(f64::NAN, 1.0)), ..frame(t, 0.02, c, d) }, path),
+        (Frame { expected_path: Some(impossible(1e300, 1.0)), ..frame(t, 0.02, c, d) }, path),
+        (Frame { expected_path: Some(impossible(0.1, -1.0)), ..frame(t, 0.02, c, d) }, path),
         (frame(t, f64::NAN, c, d), exposure),
         (frame(t, f64::INFINITY, c, d), exposure),
     ]

@@ -89,6 +89,7 @@ fn nonsense_never_panics() {
                 depth,
                 angular_velocity: gyro,
                 gyro: None,
+                expected_path: None,
             };
             let result = tracker.track(&frame).expect("a valid frame");
             let path = result.world_from_camera;

@@ -51,6 +51,7 @@ pub extern "C" fn mba_probe(
             depth,
             angular_velocity: None,
             gyro: None,
+            expected_path: None,
         };
         let tracked = tracker.track(&frame).is_ok_and(|result| result.status != FrameStatus::Lost);
         lost += i32::from(!tracked);

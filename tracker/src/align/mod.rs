@@ -48,6 +48,8 @@ pub struct Estimate {
     pub keyframe_from_camera: ExposureTrajectory,
     /// What the path has beyond linear motion; zero for a global shutter.
     pub bow: Vector6<f64>,
+    /// The cubic part of the path, which is no unknown: it is what was expected.
+    pub jerk: Vector6<f64>,
     /// Brightness of the frame relative to the reference.
     pub brightness: BrightnessModel,
 }
@@ -56,13 +58,14 @@ impl Estimate {
     /// An estimate without bow and with the brightness of the reference.
     #[must_use]
     pub fn linear(keyframe_from_camera: ExposureTrajectory) -> Self {
-        Self { keyframe_from_camera, bow: Vector6::zeros(), brightness: BrightnessModel::default() }
+        let brightness = BrightnessModel::default();
+        Self { keyframe_from_camera, bow: Vector6::zeros(), jerk: Vector6::zeros(), brightness }
     }
 
     /// The path as a function of time.
     #[must_use]
     pub fn path(&self) -> BowedTrajectory {
-        BowedTrajectory { linear: self.keyframe_from_camera, bow: self.bow }
+        BowedTrajectory { linear: self.keyframe_from_camera, bow: self.bow, jerk: self.jerk }
     }
 
     /// Applies a step in (centre, exposure motion, gain, offset, bow) coordinates.
@@ -76,6 +79,7 @@ impl Estimate {
                 end: self.keyframe_from_camera.end.perturbed(&(centre + motion * 0.5)),
             },
             bow: self.bow + step.fixed_rows::<6>(UNKNOWNS),
+            jerk: self.jerk,
             brightness: BrightnessModel {
                 gain: self.brightness.gain + step[12] as f32,
                 offset: self.brightness.offset + step[13] as f32,

@@ -103,7 +103,8 @@ pub(super) fn code_of_frame(error: FrameError) -> i32 {
         FrameError::Size { .. } => MBA_ERROR_IMAGE_SIZE,
         FrameError::Timestamp { .. } => MBA_ERROR_TIMESTAMP,
         FrameError::DepthTimestamp { .. } => MBA_ERROR_DEPTH_TIMESTAMP,
-        FrameError::Pose => MBA_ERROR_POSE,
+        // Frames of the C interface have no expected path.
+        FrameError::Pose | FrameError::ExpectedPath => MBA_ERROR_POSE,
         FrameError::Exposure { .. } => MBA_ERROR_EXPOSURE,
     }
 }

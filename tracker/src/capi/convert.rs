@@ -156,6 +156,7 @@ pub(super) unsafe fn frame<'a>(frame: &MbaFrame) -> Result<Frame<'a>, i32> {
         depth,
         angular_velocity,
         gyro: None,
+        expected_path: None,
     })
 }
 

@@ -278,7 +278,10 @@ mod tests {
     fn path() -> BowedTrajectory {
         let motion = Vector6::new(0.04, -0.03, 0.05, 0.02, -0.06, 0.04);
         let linear = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &motion);
-        BowedTrajectory { linear, bow: Vector6::new(0.02, 0.01, -0.02, 0.01, 0.02, -0.01) }
+        BowedTrajectory {
+            bow: Vector6::new(0.02, 0.01, -0.02, 0.01, 0.02, -0.01),
+            ..BowedTrajectory::without_bow(linear)
+        }
     }
 
     const TIMING: FrameTiming =

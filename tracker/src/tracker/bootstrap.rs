@@ -70,7 +70,7 @@ impl Tracker<'_> {
     ) -> BowedTrajectory {
         let span = self.keyframe_span;
         let linear = ExposureTrajectory::from_mid_and_motion(&RigidTransform::identity(), &(rate * span));
-        BowedTrajectory { linear, bow: acceleration * (0.5 * span * span) }
+        BowedTrajectory { linear, bow: acceleration * (0.5 * span * span), jerk: Vector6::zeros() }
     }
 
     /// Aligns the frame with the keyframe and the keyframe with the frame in turn, until each has been given one time with
@@ -95,6 +95,7 @@ impl Tracker<'_> {
                 timestamp: motion.timestamp,
                 angular_velocity: None,
                 gyro: self.keyframe_gyro,
+                expected_path: None,
                 ..*frame
             };
             let from_frame = Motion::still(frame.timestamp, RigidTransform::identity());

@@ -3,7 +3,7 @@
 use arrayvec::ArrayVec;
 use nalgebra::{Vector3, Vector6};
 
-use super::frame::GyroReading;
+use super::frame::{ExpectedPath, GyroReading};
 use super::history::Motion;
 use crate::align::{AlignScratch, Alignment, Estimate, LevelOutcome, LevelPlan, MotionPrior};
 use crate::geometry::RigidTransform;
@@ -51,6 +51,8 @@ pub(super) struct FrameTask<'a> {
     pub(super) gyro: Option<Vector3<f64>>,
     /// Turning around mid exposure, without bias.
     pub(super) turning: Option<GyroReading>,
+    /// The motion around mid exposure as something else knows it.
+    pub(super) expected_path: Option<ExpectedPath>,
     pub(super) brightness: BrightnessModel,
     /// Whether the motion during the exposure is sampled.
     pub(super) blur: bool,
@@ -216,6 +218,9 @@ impl FrameTask<'_> {
     }
 
     fn prior_at(&self, reference_from_mid: &RigidTransform) -> MotionPrior {
+        if let Some(expected) = &self.expected_path {
+            return expected.prior(reference_from_mid, self.span, &self.alignment.camera, self.inverse_depth);
+        }
         let prior = self.motion.expected_motion(
             reference_from_mid,
             self.timestamp,
@@ -236,12 +241,14 @@ impl FrameTask<'_> {
     fn estimate_at(&self, reference_from_mid: &RigidTransform) -> Estimate {
         let prior = self.prior_at(reference_from_mid);
         let bowed = self.alignment.frame.timing.reaches_outside();
+        let expected = self.expected_path.filter(|_| bowed);
         Estimate {
             keyframe_from_camera: ExposureTrajectory::from_mid_and_motion(
                 reference_from_mid,
                 &prior.expected,
             ),
             bow: if bowed { prior.bow } else { Vector6::zeros() },
+            jerk: expected.map_or_else(Vector6::zeros, |path| path.at(reference_from_mid, self.span).jerk),
             brightness: self.brightness,
         }
     }

@@ -1,6 +1,6 @@
 //! Input of the tracker.
 
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 use crate::geometry::RigidTransform;
 use crate::image::{ColourView, DepthView};
@@ -23,6 +23,25 @@ pub struct Frame<'a> {
     pub angular_velocity: Option<Vector3<f64>>,
     /// What a gyroscope says of the turning around mid exposure, if one is at hand.
     pub gyro: Option<GyroReading>,
+    /// How the camera moves around mid exposure as something else knows it, for example a filter, or this tracker when the
+    /// recording was tracked before and the frames after this one are known, too.
+    pub expected_path: Option<ExpectedPath>,
+}
+
+/// How a camera moves around mid exposure (of the middle row): derivatives of its pose by time, translation in the axes of
+/// the camera at mid exposure in metres, rotation in the camera in radians.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ExpectedPath {
+    /// Velocity, per second.
+    pub velocity: Vector6<f64>,
+    /// Acceleration, per square second.
+    pub acceleration: Vector6<f64>,
+    /// Change of the acceleration, per cube of a second.
+    pub jerk: Vector6<f64>,
+    /// Standard deviation of the velocity, translation and rotation; 0 or above.
+    pub velocity_sigma: [f64; 2],
+    /// Standard deviation of the acceleration, translation and rotation; 0 or above.
+    pub acceleration_sigma: [f64; 2],
 }
 
 /// How the camera turns around mid exposure (of the middle row), as measured by a gyroscope; its bias may still be in it.

@@ -29,7 +29,7 @@ pub(super) struct Motion {
 const MAX_GAP: f64 = 0.25;
 
 /// Standard deviation of the expected blur in pixels when the camera stands still.
-const FLOOR_PIXELS: f64 = 0.5;
+pub(super) const FLOOR_PIXELS: f64 = 0.5;
 
 /// The same for the bow, as a multiple: where a path of one unit ends, a quarter of the bow is seen.
 const BOW_FLOOR: f64 = 4.0;

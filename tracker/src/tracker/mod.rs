@@ -5,6 +5,7 @@ mod bound;
 mod coarse_to_fine;
 mod config;
 mod evidence;
+mod expected;
 mod frame;
 mod hindsight;
 mod history;
@@ -20,6 +21,6 @@ mod track;
 pub use config::{
     Effort, MAX_RECENT_KEYFRAMES, Readout, ReferenceMode, TrackerConfig, WorkspacePlan, workspace_len,
 };
-pub use frame::{Frame, GyroReading, ReferenceView};
+pub use frame::{ExpectedPath, Frame, GyroReading, ReferenceView};
 pub use result::{Doubt, FrameResult, FrameStatus, Revision};
 pub use track::Tracker;

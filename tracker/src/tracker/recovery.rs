@@ -122,6 +122,7 @@ impl<'m> RecentKeyframes<'m> {
                 span: 0.0,
                 gyro: None,
                 turning: None,
+                expected_path: None,
                 brightness: BrightnessModel::default(),
                 blur: false,
                 inverse_depth: typical_inverse_depth(finest),

@@ -176,7 +176,8 @@ impl Tracker<'_> {
         let motion = old.linear.motion() + correction.fixed_rows::<6>(0) * span;
         let bow = old.bow + correction.fixed_rows::<6>(6) * (0.5 * span * span);
         let mid = RigidTransform::identity();
-        let path = BowedTrajectory { linear: ExposureTrajectory::from_mid_and_motion(&mid, &motion), bow };
+        let linear = ExposureTrajectory::from_mid_and_motion(&mid, &motion);
+        let path = BowedTrajectory { linear, bow, jerk: old.jerk };
         let depth_time = 0.5 + self.keyframe.timing.depth_time;
         let moved = path.at(depth_time).compose(&old.at(depth_time).inverse());
         self.keyframe.keyframe_from_camera = Some(path);

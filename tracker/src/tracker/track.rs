@@ -213,6 +213,9 @@ impl<'m> Tracker<'m> {
         if !(frame.exposure >= 0.0 && frame.exposure.is_finite()) {
             return Err(FrameError::Exposure { got: frame.exposure });
         }
+        if !frame.expected_path.is_none_or(|path| path.is_sound()) {
+            return Err(FrameError::ExpectedPath);
+        }
         let apart = frame.depth_timestamp - frame.timestamp;
         let belongs = apart.abs() <= MAX_DEPTH_OFFSET;
         if self.config.readout.depth_apart && !belongs {
@@ -247,6 +250,7 @@ impl<'m> Tracker<'m> {
         result.doubt = Some(Doubt::NoStart);
         if enough && in_range && self.depth_share >= MIN_START_DEPTH {
             self.motion = Some(Motion::still(frame.timestamp, origin));
+            self.take_expected_path(frame, &mut result);
             self.established = false;
             self.lost_at_start = 0;
             result.status = FrameStatus::Ok;
@@ -327,6 +331,7 @@ impl<'m> Tracker<'m> {
         self.keep_keyframe();
         self.promote(world_from_mid, None, f32::MAX);
         self.motion = Some(Motion::still(frame.timestamp, *world_from_mid));
+        self.take_expected_path(frame, &mut result);
         result.status = FrameStatus::Weak;
         result.doubt = Some(Doubt::FoundAgain);
         result.is_keyframe = true;
@@ -376,6 +381,7 @@ impl<'m> Tracker<'m> {
             turning: frame
                 .gyro
                 .map(|gyro| GyroReading { angular_velocity: gyro.angular_velocity - self.gyro_bias, ..gyro }),
+            expected_path: frame.expected_path,
             brightness: self.brightness,
             blur,
             inverse_depth: typical_inverse_depth(self.keyframe.finest_keypoints()),

@@ -54,7 +54,7 @@ pub fn track(memory: &mut [u8], mut print: impl FnMut(Line)) -> bool {
         let depth = DepthView::new(&DEPTH, CAMERA.width, CAMERA.height, CAMERA.width);
         let (Ok(colour), Ok(depth)) = (colour, depth) else { return false };
         let timestamp = k as f64 / 30.0;
-        let frame = Frame { timestamp, exposure: 0.5 / 30.0, depth_timestamp: timestamp, colour, depth, angular_velocity: None, gyro: None };
+        let frame = Frame { timestamp, exposure: 0.5 / 30.0, depth_timestamp: timestamp, colour, depth, angular_velocity: None, gyro: None, expected_path: None };
         let Ok(result) = tracker.track(&frame) else { return false };
         tracked &= result.status != FrameStatus::Lost;
         print(Line(&result));

@@ -1,21 +1,24 @@
-//! Linear motion plus a parabola, and when the rows of a frame were exposed along it.
+//! Linear motion plus a parabola and a cubic, and when the rows of a frame were exposed along it.
 
 use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::ExposureTrajectory;
 use crate::geometry::{RigidTransform, so3};
 
-/// A path with acceleration: the linear motion of an [`ExposureTrajectory`] plus a parabola that is zero in its middle.
+/// A path with acceleration: the linear motion of an [`ExposureTrajectory`] plus a parabola and a cubic that are zero in its
+/// middle.
 ///
-/// With `d = s - 1/2`, translation gets `d^2 bow_t` in the reference frame, and rotation the factor `exp(d^2 bow_r)`
-/// from the right. Rows that are exposed one after the other see the path far outside of one exposure, where a hand's
-/// acceleration moves the image by several pixels.
+/// With `d = s - 1/2`, translation gets `d^2 bow_t + d^3 jerk_t` in the reference frame, and rotation the factor
+/// `exp(d^2 bow_r + d^3 jerk_r)` from the right. Rows that are exposed one after the other see the path far outside of one
+/// exposure, where a hand's acceleration moves the image by several pixels, and a change of the acceleration by one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BowedTrajectory {
     /// `reference_from_camera` at s = 0 and s = 1 of the linear motion.
     pub linear: ExposureTrajectory,
     /// (translation in the reference frame in metres, rotation in the camera in radians) per square of s.
     pub bow: Vector6<f64>,
+    /// The same per cube of s.
+    pub jerk: Vector6<f64>,
 }
 
 /// A path at one time.
@@ -35,7 +38,7 @@ impl BowedTrajectory {
     /// The path without acceleration.
     #[must_use]
     pub fn without_bow(linear: ExposureTrajectory) -> Self {
-        Self { linear, bow: Vector6::zeros() }
+        Self { linear, bow: Vector6::zeros(), jerk: Vector6::zeros() }
     }
 
     /// The path through the poses at s = 0, 1/2 and 1.
@@ -51,15 +54,14 @@ impl BowedTrajectory {
             linear = ExposureTrajectory { start: start.perturbed(&-quarter), end: end.perturbed(&-quarter) };
             quarter -= linear.mid().tangent_to(mid);
         }
-        Self { linear, bow: quarter * 4.0 }
+        Self { linear, bow: quarter * 4.0, jerk: Vector6::zeros() }
     }
 
     /// `reference_from_camera` at normalised time `s`, also outside of `[0, 1]`.
     #[must_use]
     pub fn at(&self, s: f64) -> RigidTransform {
-        let height = (s - 0.5) * (s - 0.5);
         let linear = self.linear.at(s);
-        if self.bow == Vector6::zeros() { linear } else { linear.perturbed(&(self.bow * height)) }
+        if self.is_bent() { linear.perturbed(&self.bend(s)) } else { linear }
     }
 
     /// The matrix C with `phi_s = C dr` for a change `dr` of the rotational bow, where `phi_s` is a left rotation, without
@@ -78,18 +80,22 @@ impl BowedTrajectory {
     /// All that is known of the path at `s`, for the rotation vector `omega` of its linear motion, which many times share.
     #[must_use]
     pub fn point(&self, s: f64, omega: &Vector3<f64>) -> PathPoint {
-        let height = (s - 0.5) * (s - 0.5);
         let linear = self.linear.at_turned(s, omega);
-        let slope = 2.0 * (s - 0.5);
-        let shift =
-            self.linear.end.translation - self.linear.start.translation + self.bow.fixed_rows::<3>(0) * slope;
-        // exp(x beta) turns about beta for every x.
-        let turn = self.linear.start.rotation * omega + linear.rotation * self.bow.fixed_rows::<3>(3) * slope;
-        let is_straight = self.bow == Vector6::zeros();
+        let d = s - 0.5;
+        let slope = self.bow * (2.0 * d) + self.jerk * (3.0 * d * d);
+        let shift = self.linear.end.translation - self.linear.start.translation + slope.fixed_rows::<3>(0);
+        let bend = self.bend(s);
+        let bow_blend_left =
+            linear.rotation_matrix() * so3::right_jacobian(&-Vector3::from(bend.fixed_rows::<3>(3)));
+        let slope_turn = Vector3::from(slope.fixed_rows::<3>(3));
+        // A turn about an axis that stays turns about it at every time.
+        let axis_stays = self.jerk == Vector6::zeros();
+        let bent_turn = if axis_stays { linear.rotation * slope_turn } else { bow_blend_left * slope_turn };
+        let turn = self.linear.start.rotation * omega + bent_turn;
         PathPoint {
-            pose: if is_straight { linear } else { linear.perturbed(&(self.bow * height)) },
+            pose: if self.is_bent() { linear.perturbed(&bend) } else { linear },
             rotation_blend_left: self.linear.rotation_blend_left_turned(s, omega),
-            bow_blend_left: linear.rotation_matrix() * so3::right_jacobian(&-self.turn(s)),
+            bow_blend_left,
             velocity_left: Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z),
         }
     }
@@ -103,14 +109,24 @@ impl BowedTrajectory {
     /// The path seen from another reference frame.
     #[must_use]
     pub fn seen_from(&self, other_from_reference: &RigidTransform) -> Self {
-        let mut bow = self.bow;
-        let shift = other_from_reference.rotation * Vector3::from(self.bow.fixed_rows::<3>(0));
-        bow.fixed_rows_mut::<3>(0).copy_from(&shift);
-        Self { linear: self.linear.seen_from(other_from_reference), bow }
+        let turned = |bend: &Vector6<f64>| {
+            let mut turned = *bend;
+            let shift = other_from_reference.rotation * Vector3::from(bend.fixed_rows::<3>(0));
+            turned.fixed_rows_mut::<3>(0).copy_from(&shift);
+            turned
+        };
+        let linear = self.linear.seen_from(other_from_reference);
+        Self { linear, bow: turned(&self.bow), jerk: turned(&self.jerk) }
     }
 
-    fn turn(&self, s: f64) -> Vector3<f64> {
-        self.bow.fixed_rows::<3>(3) * ((s - 0.5) * (s - 0.5))
+    fn is_bent(&self) -> bool {
+        self.bow != Vector6::zeros() || self.jerk != Vector6::zeros()
+    }
+
+    /// What the path has at `s` beyond linear motion.
+    fn bend(&self, s: f64) -> Vector6<f64> {
+        let d = s - 0.5;
+        self.bow * (d * d) + self.jerk * (d * d * d)
     }
 }
 
@@ -179,7 +195,8 @@ mod tests {
         let start = RigidTransform::identity().perturbed(&Vector6::new(0.3, -0.2, 0.5, 0.4, -0.3, 0.2));
         let end = start.perturbed(&Vector6::new(0.02, 0.01, -0.03, 0.05, -0.08, 0.03));
         let bow = Vector6::new(0.03, -0.02, 0.01, -0.06, 0.05, 0.04);
-        BowedTrajectory { linear: ExposureTrajectory { start, end }, bow }
+        let jerk = Vector6::new(0.01, 0.02, -0.03, 0.02, -0.07, 0.03);
+        BowedTrajectory { linear: ExposureTrajectory { start, end }, bow, jerk }
     }
 
     fn left_tangent(from: &RigidTransform, to: &RigidTransform) -> Vector6<f64> {
@@ -221,7 +238,7 @@ mod tests {
 
     #[test]
     fn three_poses_define_the_path() {
-        let path = path();
+        let path = BowedTrajectory { jerk: Vector6::zeros(), ..path() };
         let found = BowedTrajectory::through(&path.at(0.0), &path.at(0.5), &path.at(1.0));
         for s in [-0.8, 0.3, 1.9] {
             let error = found.at(s).tangent_to(&path.at(s)).norm();

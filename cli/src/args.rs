@@ -203,6 +203,10 @@ pub struct Tracking {
     /// Use the depth map of each frame, or only that of the keyframe
     #[arg(long, value_enum, default_value_t)]
     pub depth_term: Switch,
+    /// Track frames that are blurred, or whose rows are exposed one after the other, once more, from the last to the first, and
+    /// join what both ways measured; takes as long again
+    #[arg(long, value_enum, default_value_t)]
+    pub hindsight: Switch,
     /// Write the deblurred image of every keyframe, after the last frame
     #[arg(long, value_enum, default_value_t)]
     pub keyframes: Switch,

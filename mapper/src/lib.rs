@@ -28,6 +28,6 @@ pub use mba_io::{
 };
 pub use mba_map::{infill, map, rendering, surfaces, viewer_splats};
 pub use mba_raster::{exposure, gaussians, losses, raster, sensor};
-pub use mba_slam::{export, mapping, run, self_calibration, slam, tracking};
+pub use mba_slam::{export, hindsight, mapping, run, self_calibration, slam, tracking};
 pub use mba_submaps as submaps;
 pub use mba_synth as synth;

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use mba_mapper::dataset::{self, Dataset};
 use mba_mapper::exposure::{blur_length, motion_of};
+use mba_mapper::hindsight::look_back;
 use mba_mapper::map::StoredMap;
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::output::{OutputFolder, Permission};
-use mba_mapper::run::{FrameRecord, FrameStatus, Run, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{FrameRecord, FrameStatus, Merit, Run, RunSettings, RunWriter, Summary};
 use mba_mapper::slam::{SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
-use mba_mapper::tracking::{TrackingOptions, track_dataset};
+use mba_mapper::tracking::{TrackingOptions, track_and_keep, track_dataset};
 use mba_mapper::trajectory_file::TimedExposure;
 use tempfile::TempDir;
 
@@ -90,6 +91,25 @@ impl BlurredSequence {
             .expect("tracked");
         writer.finish(|_| ()).expect("a finished run");
         Run::open(&folder).expect("a run")
+    }
+
+    /// Tracks the sequence into the folder `name`, then looks back; returns the error of the trajectory before and after, metres.
+    ///
+    /// # Panics
+    /// When that fails.
+    #[must_use]
+    pub fn track_both_ways(&self, name: &str) -> [f64; 2] {
+        let mut writer = RunWriter::create_in(&self.path(name), self.describe()).expect("a run");
+        let options = TrackingOptions::default();
+        let go_on = || ControlFlow::Continue(());
+        let tracked =
+            track_and_keep(&self.dataset, &options, &mut writer, None, |_| go_on()).expect("tracked");
+        let error = |writer: &RunWriter| {
+            Merit::of(writer.exposures(), &self.dataset).trajectory.expect("a true trajectory").ate_m.rmse
+        };
+        let before = error(&writer);
+        look_back(&self.dataset, &options, &mut writer, &tracked.measured, go_on).expect("looked back");
+        [before, error(&writer)]
     }
 
     /// Maps the sequence from `run` into the folder `name`.

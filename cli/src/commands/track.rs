@@ -5,12 +5,14 @@ use std::path::Path;
 use std::time::Duration;
 
 use mba_mapper::dataset::Dataset;
+use mba_mapper::hindsight::look_back;
 use mba_mapper::run::{
     Merit, RunError, RunSettings, RunWriter, Summary, plausibility, write_deblurred_keyframes,
 };
 use mba_mapper::self_calibration::{contradictions, depth_lag_of_tracked};
 use mba_mapper::tracking::{
-    TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config, upright_world,
+    Tracked, TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config,
+    upright_world,
 };
 use nalgebra::UnitVector3;
 use serde_json::json;
@@ -80,7 +82,14 @@ pub fn track_into(
             Err(error).or_bad_input(CHECKPOINT_HINT)?;
         }
         other => {
-            if let Some(lag) = depth_lag_of_tracked(dataset, other?) {
+            let tracked = other?;
+            if args.hindsight == Switch::On {
+                match look_back_with_progress(dataset, &options, &mut writer, &tracked, console) {
+                    Err(TrackingError::Stopped) => return Err(stopped(dataset, out, &writer, resumption)),
+                    other => other?,
+                }
+            }
+            if let Some(lag) = depth_lag_of_tracked(dataset, tracked.disagreement) {
                 console.warning(lag.to_string());
                 writer.warn(lag.to_string());
             }
@@ -117,6 +126,23 @@ pub fn track_into(
     Ok(summary)
 }
 
+/// Tracks the recording once more, backwards, and joins both ways in `writer`.
+fn look_back_with_progress(
+    dataset: &Dataset,
+    options: &TrackingOptions,
+    writer: &mut RunWriter,
+    tracked: &Tracked,
+    console: &Console,
+) -> Result<(), TrackingError> {
+    let progress = console.progress(dataset.len(), "looking back");
+    let looked_back = look_back(dataset, options, writer, &tracked.measured, || {
+        progress.inc(1);
+        interrupt::flow()
+    });
+    progress.finish_and_clear();
+    looked_back
+}
+
 /// Moves the run into a world whose z axis points up, if it is known where that is.
 fn stand_upright(dataset: &Dataset, up_in_first_camera: Option<UnitVector3<f64>>, writer: &mut RunWriter) {
     let (exposures, records) = (writer.exposures(), writer.frames());
@@ -150,6 +176,7 @@ fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
         "virtual_views": or_auto(options.virtual_views),
         "reference": format!("{:?}", options.reference).to_lowercase(),
         "tracker_memory_bytes": tracker_config(dataset, &options).workspace_len(),
+        "hindsight": if args.hindsight == Switch::On { "on" } else { "off" },
         "depth_term": if args.depth_term == Switch::On { "on" } else { "off" },
     });
     written_run::settings(dataset, &values)

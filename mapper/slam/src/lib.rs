@@ -1,5 +1,6 @@
 //! From a data set to a RUN folder: tracking, mapping, both at once, and what they need around them.
 
+pub mod hindsight;
 pub mod mapping;
 pub mod self_calibration;
 pub mod slam;

@@ -18,6 +18,7 @@ use mba_tracker::{
 };
 
 use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
+pub use crate::uncertainty::Measured;
 use crate::uncertainty::Uncertainty;
 use mba_io::checkpoint::CheckpointError;
 pub use saved::TrackingCheckpoint;
@@ -58,6 +59,15 @@ pub enum TrackingError {
     /// A checkpoint cannot be written, or gone on from.
     #[error(transparent)]
     Checkpoint(#[from] CheckpointError),
+}
+
+/// What is known of a tracked recording beside its run.
+#[derive(Clone, Debug)]
+pub struct Tracked {
+    /// How far picture and depth contradict each other in the median frame, see [`FrameResult::disagreement`].
+    pub disagreement: f64,
+    /// What each frame of the data set was aligned with.
+    pub measured: Vec<Measured>,
 }
 
 /// The tracker's configuration for a data set.
@@ -117,7 +127,6 @@ pub fn track_dataset(
 
 /// As [`track_dataset`], with checkpoints: the run goes on from the one that was read, if there is one, and ends as if it
 /// had never been stopped. One is written from time to time, and when `observe` asks for an end.
-/// Returns how far picture and depth contradict each other in the median frame, see [`FrameResult::disagreement`].
 ///
 /// # Errors
 /// As [`track_dataset`].
@@ -127,7 +136,7 @@ pub fn track_and_keep(
     run: &mut RunWriter,
     mut checkpoint: Option<&mut TrackingCheckpoint>,
     mut observe: impl FnMut(&FrameRecord) -> ControlFlow<()>,
-) -> Result<f64, TrackingError> {
+) -> Result<Tracked, TrackingError> {
     let config = tracker_config(dataset, options);
     config.validate().map_err(TrackingError::Camera)?;
     // Without images the size of the camera is a mere claim, for which no memory is taken.
@@ -178,7 +187,20 @@ pub fn track_and_keep(
             return Err(TrackingError::Stopped);
         }
     }
-    Ok(uncertainty.disagreement())
+    Ok(Tracked {
+        disagreement: uncertainty.disagreement(),
+        measured: by_frame(dataset.len(), &given, &uncertainty),
+    })
+}
+
+/// What each of `frames` frames was aligned with, of which the tracker was `given` some.
+fn by_frame(frames: usize, given: &[usize], uncertainty: &Uncertainty) -> Vec<Measured> {
+    let mut measured: Vec<Measured> =
+        (0..frames).map(|reference| Measured { reference, ..Measured::default() }).collect();
+    for (&index, of_frame) in given.iter().zip(uncertainty.measured(given)) {
+        measured[index] = of_frame;
+    }
+    measured
 }
 
 /// Replaces what `run` has of frame `index`.
@@ -235,6 +257,7 @@ pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
         depth: DepthView::new(&image.depth, width, height, width)?,
         angular_velocity: None,
         gyro: None,
+        expected_path: None,
     })
 }
 

@@ -25,6 +25,23 @@ struct Pose {
     rotation: f64,
     /// World, metres.
     place: [f64; 3],
+    measured: Measured,
+}
+
+/// What a frame was aligned with, and how uncertain it is relative to that.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Measured {
+    /// Index of the frame that it was aligned with; its own where there is none.
+    pub reference: usize,
+    /// Standard deviations along one axis, metres, and about one, radians; 0 for a frame that was not aligned.
+    pub sigma: [f64; 2],
+}
+
+impl Measured {
+    /// The same with the reference as a frame of the recording, of which the tracker was `given` some.
+    fn of_recording(self, given: &[usize]) -> Self {
+        Self { reference: given.get(self.reference).copied().unwrap_or(0), ..self }
+    }
 }
 
 impl Uncertainty {
@@ -33,6 +50,16 @@ impl Uncertainty {
         let mut sorted = self.disagreements.clone();
         sorted.sort_by(f64::total_cmp);
         sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    }
+
+    /// What each frame was aligned with; `given` are the frames of the recording that were taken in.
+    pub(crate) fn measured(&self, given: &[usize]) -> Vec<Measured> {
+        self.frames.iter().map(|frame| frame.measured.of_recording(given)).collect()
+    }
+
+    /// What the last frame was aligned with.
+    pub(crate) fn last_measured(&self, given: &[usize]) -> Measured {
+        self.frames.last().map(|frame| frame.measured.of_recording(given)).unwrap_or_default()
     }
 
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
@@ -54,6 +81,11 @@ impl Uncertainty {
             position: reference.position + lever + position,
             rotation: reference.rotation + rotation,
             place: place.into(),
+            measured: Measured {
+                reference: result.reference_index,
+                // Three axes share the variance.
+                sigma: [position, rotation].map(|variance| (variance / 3.0).sqrt()),
+            },
         };
         self.frames.push(pose);
         let is_first = self.frames.len() == 1;

@@ -3,6 +3,7 @@
 mod bad_input;
 mod effort;
 mod faults;
+mod hindsight;
 mod memory;
 mod noise;
 mod outside;

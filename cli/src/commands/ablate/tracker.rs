@@ -38,11 +38,19 @@ enum Part {
     DepthTerm,
     Deblurring,
     Imu,
+    Hindsight,
 }
 
 impl Part {
-    const ALL: [Self; 6] =
-        [Self::Nothing, Self::Blur, Self::Rows, Self::DepthTerm, Self::Deblurring, Self::Imu];
+    const ALL: [Self; 7] = [
+        Self::Nothing,
+        Self::Blur,
+        Self::Rows,
+        Self::DepthTerm,
+        Self::Deblurring,
+        Self::Imu,
+        Self::Hindsight,
+    ];
 
     fn name(self) -> &'static str {
         match self {
@@ -52,6 +60,7 @@ impl Part {
             Self::DepthTerm => "depth term off",
             Self::Deblurring => "reference raw",
             Self::Imu => "IMU off",
+            Self::Hindsight => "hindsight off",
         }
     }
 
@@ -75,6 +84,7 @@ impl Part {
             Self::Blur => Tracking { blur: BlurMode::Off, ..all },
             Self::DepthTerm => Tracking { depth_term: Switch::Off, ..all },
             Self::Deblurring => Tracking { reference: Reference::Raw, ..all },
+            Self::Hindsight => Tracking { hindsight: Switch::Off, ..all },
             _ => all,
         }
     }

@@ -122,6 +122,8 @@ groundtruth_exposure.txt, exposures.csv and the recording of an IMU: imu.csv, im
 accelerometer.txt (TUM). What is printed says of exposure, readout, response and fall-off whether they are \
 recorded or assumed.
 
+Exit code 2 says that nothing can be read, 1 that nothing in the images can be tracked: black, of one colour, without depth.
+
 Example:
   mba info rgbd_dataset_freiburg1_rpy")]
 pub struct Info {

@@ -8,10 +8,10 @@ use mba_mapper::self_calibration::{depth_lag, quick_contradictions};
 use serde::Serialize;
 
 use super::camera_facts::CameraFacts;
-use super::open;
+use super::{open, outcome};
 use crate::args::Info;
 use crate::console::Console;
-use crate::failure::bad_input;
+use crate::failure::{bad_input, failed};
 use crate::report::table::{pairs, percent};
 
 /// Frames whose images are read.
@@ -53,18 +53,25 @@ struct Facts {
 /// Opens a data set, looks at some of its frames and prints what is there.
 ///
 /// # Errors
-/// Bad input when the data set cannot be used, or when no frame of it can be read.
+/// Bad input when the data set cannot be used, or when no frame of it can be read; a failure when its images hold nothing
+/// that could be tracked. What was found out is printed before.
 pub fn run(args: &Info, console: &Console) -> anyhow::Result<()> {
     let dataset = open::dataset(&args.dataset)?;
     let survey = survey(&dataset, SAMPLED_FRAMES);
     let (unreadable, sampled) = (survey.unreadable.len(), survey.sampled);
     let first = survey.unreadable.first().cloned().unwrap_or_default();
+    let missing = outcome::what_is_missing(&survey);
     console.result(&Facts::of(&dataset, survey), table)?;
     if unreadable == sampled {
         let message = format!("none of {sampled} sampled frames can be read, the first because {first}");
         return Err(bad_input(message, "correct the lists, or restore the images"));
     }
-    Ok(())
+    match missing {
+        Some(missing) => {
+            Err(failed(format!("nothing here can be tracked: {missing}"), "record with light and with depth"))
+        }
+        None => Ok(()),
+    }
 }
 
 impl Facts {

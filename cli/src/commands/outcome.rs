@@ -47,22 +47,32 @@ pub fn failure(dataset: &Dataset, remark: &str) -> anyhow::Error {
 
 /// Why nothing can be tracked, in a sentence.
 fn reason(dataset: &Dataset) -> String {
-    let Survey { sampled, unreadable, black, plain, without_depth, .. } = survey(dataset, SAMPLED_FRAMES);
+    what_is_missing(&survey(dataset, SAMPLED_FRAMES)).unwrap_or_else(|| {
+        format!("no frame of {} could be aligned with another", dataset.folder().display())
+    })
+}
+
+/// What a look at the images says against tracking any of them, in a sentence; `None` where nothing does.
+#[must_use]
+pub fn what_is_missing(survey: &Survey) -> Option<String> {
+    let Survey { sampled, unreadable, black, plain, without_depth, .. } = survey;
     let readable = sampled - unreadable.len();
     // A single frame that is good can be the first: nothing follows it that could be aligned.
     let is_all_but_one = |count: usize| count > 0 && count + 1 >= readable;
     match unreadable.first() {
         Some(error) if readable < 2 => {
             let unreadable = unreadable.len();
-            format!("{unreadable} of {sampled} sampled frames cannot be read, the first because {error}")
+            Some(format!(
+                "{unreadable} of {sampled} sampled frames cannot be read, the first because {error}"
+            ))
         }
-        _ if is_all_but_one(black) => format!("{black} of {readable} sampled colour images are black"),
-        _ if is_all_but_one(plain) => {
-            format!("{plain} of {readable} sampled colour images show nothing, all of one colour")
+        _ if is_all_but_one(*black) => Some(format!("{black} of {readable} sampled colour images are black")),
+        _ if is_all_but_one(*plain) => {
+            Some(format!("{plain} of {readable} sampled colour images show nothing, all of one colour"))
         }
-        _ if is_all_but_one(without_depth) => {
-            format!("{without_depth} of {readable} sampled depth images hold no depth at all")
+        _ if is_all_but_one(*without_depth) => {
+            Some(format!("{without_depth} of {readable} sampled depth images hold no depth at all"))
         }
-        _ => format!("no frame of {} could be aligned with another", dataset.folder().display()),
+        _ => None,
     }
 }

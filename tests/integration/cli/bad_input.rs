@@ -70,7 +70,7 @@ fn depth_that_is_all_zero_is_told_and_survived() {
         zero.save(place.path(&format!("data/depth/{frame:06}.png"))).unwrap();
     }
     let told = info(&place);
-    assert_eq!(told.code, Some(0), "{}", told.stderr);
+    assert_eq!(told.code, Some(1), "{}", told.stderr);
     assert!(told.stdout.contains("8 of 8 sampled depth images hold no depth at all"), "{}", told.stdout);
     let outcome = place.track();
     outcome

@@ -176,6 +176,20 @@ fn mishaps_happen_to_the_frames_that_are_named() {
 }
 
 #[test]
+fn info_fails_for_images_that_hold_nothing() {
+    let place = Workplace::new();
+    synth(&place, "dark", &["--black", "0-7"]);
+    synth(&place, "covered", &["--black", "1-2"]);
+    let info = |name: &str| mba([Path::new("info"), &place.path(name), Path::new("--json")]);
+    let dark = info("dark");
+    let reason = "error: nothing here can be tracked: 8 of 8 sampled colour images are black\n";
+    assert!(dark.code == Some(1) && dark.stderr.contains(reason), "{:?} {}", dark.code, dark.stderr);
+    // What was found out is printed all the same.
+    assert_eq!(serde_json::from_str::<serde_json::Value>(&dark.stdout).unwrap()["frames"], 8);
+    assert_eq!(info("covered").code, Some(0));
+}
+
+#[test]
 fn a_response_comes_from_a_file() {
     let place = Workplace::new();
     let file = place.path("curve.csv");

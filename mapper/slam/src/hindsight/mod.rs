@@ -7,11 +7,13 @@
 mod backwards;
 mod joined;
 mod motions;
+mod sightings;
+mod smoother;
 
 use std::ops::ControlFlow;
 
 use mba_adjust::pose_graph::PoseGraphEdge;
-use mba_io::dataset::Dataset;
+use mba_io::dataset::{Dataset, survey};
 use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{ExpectedPath, FrameStatus};
@@ -19,11 +21,15 @@ use mba_tracker::{ExpectedPath, FrameStatus};
 use crate::run::{FrameRecord, RunWriter};
 use crate::tracking::{Measured, TrackingError, TrackingOptions, tracker_config};
 use backwards::SeenBackwards;
-use motions::Sighting;
+use motions::Motions;
+use sightings::Sighting;
 
 /// Blur in pixels, of the median frame, from which the way back is worth its time where all rows are exposed together: what it
 /// knows better is how the camera moves during an exposure.
 const WORTHWHILE_BLUR: f64 = 1.0;
+
+/// Frames that a usual depth is taken from.
+const DEPTH_SAMPLES: usize = 8;
 
 /// Tracks the frames of a tracked `run` of `dataset` once more, backwards, and gives the run the poses and exposures that agree
 /// best with both ways. `measured` has what each frame was aligned with. `observe` is called before every frame and says
@@ -112,11 +118,8 @@ fn expected_paths(dataset: &Dataset, run: &RunWriter) -> Vec<Option<ExpectedPath
         (record.status == FrameStatus::Ok).then(|| Sighting::of(exposure, dataset.exposure_seconds(index)))
     };
     let sightings: Vec<Option<Sighting>> = run.frames().iter().enumerate().map(certain).collect();
-    let expected = |index: usize| {
-        let frame = sightings[index].as_ref()?;
-        let before = index.checked_sub(1).and_then(|index| sightings[index].as_ref());
-        let after = sightings.get(index + 1).and_then(Option::as_ref);
-        motions::motion_around(frame, [before, after])
-    };
-    (0..sightings.len()).map(expected).collect()
+    let Some(depth) = survey(dataset, DEPTH_SAMPLES).median_depth else { return vec![None; sightings.len()] };
+    let calibration = dataset.calibration();
+    let motions = Motions::of(&sightings, &calibration.camera, depth, 1.0 / calibration.frame_rate);
+    (0..sightings.len()).map(|index| motions.around(index)).collect()
 }

@@ -69,11 +69,7 @@ impl Uncertainty {
         let place = result.world_from_mid.translation;
         let start = Pose { place: place.into(), ..Pose::default() };
         let reference = self.frames.get(result.reference_index).copied().unwrap_or(start);
-        let covariance = result.information.try_inverse();
-        let own = covariance.map(|covariance| {
-            let variance = |first: usize| (first..first + 3).map(|i| covariance[(i, i)]).sum::<f64>();
-            [variance(0), variance(3)].map(|variance| variance * result.disagreement.max(1.0))
-        });
+        let own = variances(result);
         let [position, rotation] = own.unwrap_or_default();
         // A small turn moves a point at distance d by d times its share across the line to it: two of three axes.
         let lever = (place - Vector3::from(reference.place)).norm_squared() * reference.rotation * 2.0 / 3.0;
@@ -83,12 +79,29 @@ impl Uncertainty {
             place: place.into(),
             measured: Measured {
                 reference: result.reference_index,
-                // Three axes share the variance.
-                sigma: [position, rotation].map(|variance| (variance / 3.0).sqrt()),
+                sigma: [position, rotation].map(along_one_axis),
             },
         };
         self.frames.push(pose);
         let is_first = self.frames.len() == 1;
         (own.is_some() || is_first).then(|| pose.position.sqrt()).filter(|sigma| sigma.is_finite())
     }
+}
+
+/// Variances of position, square metres, and rotation, square radians, of a frame relative to what it was aligned with, all axes
+/// together; none where it was not aligned.
+fn variances(result: &FrameResult) -> Option<[f64; 2]> {
+    let covariance = result.information.try_inverse()?;
+    let variance = |first: usize| (first..first + 3).map(|i| covariance[(i, i)]).sum::<f64>();
+    Some([variance(0), variance(3)].map(|variance| variance * result.disagreement.max(1.0)))
+}
+
+/// Three axes share a variance.
+fn along_one_axis(variance: f64) -> f64 {
+    (variance / 3.0).sqrt()
+}
+
+/// The standard deviations of [`Measured`].
+pub(crate) fn sigma_of(result: &FrameResult) -> Option<[f64; 2]> {
+    variances(result).map(|variances| variances.map(along_one_axis))
 }

@@ -39,33 +39,100 @@ pub(super) fn edge(
     })
 }
 
-/// Mid poses that agree best with what both ways measured.
-pub(super) fn joined_poses(
-    world_from_mid: Vec<RigidTransform>,
-    edges: Vec<PoseGraphEdge>,
-) -> Result<Vec<RigidTransform>, PoseGraphError> {
-    let mut graph = PoseGraph { world_from_keyframe: world_from_mid, edges };
-    graph.optimise(&PoseGraphSettings::default())?;
-    Ok(graph.world_from_keyframe)
+/// One trajectory from both ways.
+pub(super) struct Joined {
+    /// Mid poses that agree best with what both ways measured.
+    pub(super) world_from_mid: Vec<RigidTransform>,
+    /// Whether what the first way and the way back say of each frame agrees with them.
+    pub(super) agrees: Vec<[bool; 2]>,
 }
 
-/// The exposure around `world_from_mid` that lies between those of both ways.
-pub(super) fn joined_exposure(
-    forwards: &TimedExposure,
-    backwards: Option<&SeenBackwards>,
-    world_from_mid: &RigidTransform,
-) -> TimedExposure {
-    let around = |exposure: &TimedExposure| {
-        let mid_from_world = exposure.mid.inverse();
-        [exposure.start, exposure.end].map(|end| mid_from_world.compose(&end))
-    };
-    let mut ends = around(forwards);
-    if let Some(backwards) = backwards {
-        let others = around(&backwards.exposure);
-        ends = [0, 1].map(|k| ends[k].perturbed(&(ends[k].tangent_to(&others[k]) * 0.5)));
+/// Joins what both ways measured of every frame, `ways`, and what was measured of places that were seen `again`; `forwards` are
+/// the poses of the first way.
+///
+/// Where the ways contradict each other, what contradicts more of the rest is left out, and if nothing else decides, what is
+/// less certain of itself.
+pub(super) fn joined(
+    forwards: Vec<RigidTransform>,
+    ways: &[[Option<PoseGraphEdge>; 2]],
+    again: &[PoseGraphEdge],
+) -> Result<Joined, PoseGraphError> {
+    let settings = PoseGraphSettings::default();
+    let (origins, mut edges): (Vec<[usize; 2]>, Vec<PoseGraphEdge>) = ways
+        .iter()
+        .enumerate()
+        .flat_map(|(frame, ways)| [0, 1].map(|way| ways[way].map(|edge| ([frame, way], edge))))
+        .flatten()
+        .unzip();
+    edges.extend(again);
+    // Neither way is right from the beginning: the start is the middle between both.
+    let believed = edges.iter().map(|edge| PoseGraphEdge { robust: false, ..*edge }).collect();
+    let mut graph = PoseGraph { world_from_keyframe: forwards.clone(), edges: believed };
+    graph.optimise(&settings)?;
+    graph.edges = edges;
+    let mut rejected = graph.optimise(&settings)?.rejected;
+    if !is_connected(&graph, &rejected) {
+        // Both ways to a frame were left out. The first way does not lose any.
+        graph.world_from_keyframe = forwards;
+        graph.edges.iter_mut().zip(&origins).for_each(|(edge, [_, way])| edge.robust &= *way == 1);
+        rejected = graph.optimise(&settings)?.rejected;
     }
-    let [start, end] = ends.map(|end| world_from_mid.compose(&end));
-    TimedExposure { timestamp: forwards.timestamp, start, mid: *world_from_mid, end }
+    let mut agrees = vec![[true; 2]; ways.len()];
+    // Edges of places come last.
+    for [frame, way] in rejected.into_iter().filter_map(|edge| origins.get(edge).copied()) {
+        agrees[frame][way] = false;
+    }
+    Ok(Joined { world_from_mid: graph.world_from_keyframe, agrees })
+}
+
+/// Whether what is tied together by all edges is so without those that were rejected, in ascending order.
+fn is_connected(graph: &PoseGraph, rejected: &[usize]) -> bool {
+    let parts = |is_counted: &dyn Fn(usize) -> bool| {
+        let mut part: Vec<usize> = (0..graph.world_from_keyframe.len()).collect();
+        let mut count = part.len();
+        for (_, edge) in graph.edges.iter().enumerate().filter(|(k, _)| is_counted(*k)) {
+            let [one, other] = [edge.from, edge.to].map(|node| root(&part, node));
+            count -= usize::from(one != other);
+            part[one] = other;
+        }
+        count
+    };
+    parts(&|_| true) == parts(&|edge| rejected.binary_search(&edge).is_err())
+}
+
+/// The node that stands for the part which `node` belongs to.
+fn root(part: &[usize], mut node: usize) -> usize {
+    while part[node] != node {
+        node = part[node];
+    }
+    node
+}
+
+/// What both ways say of the exposure of one frame.
+pub(super) struct Ends<'a> {
+    pub(super) forwards: &'a TimedExposure,
+    /// Whether that agrees with the joined trajectory.
+    pub(super) forwards_agrees: bool,
+    /// The way back, where it agrees.
+    pub(super) back: Option<&'a SeenBackwards>,
+}
+
+impl Ends<'_> {
+    /// The exposure around `world_from_mid`: what agrees, or between both ways.
+    pub(super) fn around(&self, world_from_mid: &RigidTransform) -> TimedExposure {
+        let of = |exposure: &TimedExposure| {
+            let mid_from_world = exposure.mid.inverse();
+            [exposure.start, exposure.end].map(|end| mid_from_world.compose(&end))
+        };
+        let mut ends = of(self.forwards);
+        if let Some(back) = self.back {
+            let others = of(&back.exposure);
+            let share = if self.forwards_agrees { 0.5 } else { 1.0 };
+            ends = [0, 1].map(|k| ends[k].perturbed(&(ends[k].tangent_to(&others[k]) * share)));
+        }
+        let [start, end] = ends.map(|end| world_from_mid.compose(&end));
+        TimedExposure { timestamp: self.forwards.timestamp, start, mid: *world_from_mid, end }
+    }
 }
 
 #[cfg(test)]
@@ -83,34 +150,90 @@ mod tests {
         Measured { reference, sigma: [1e-3, 1e-3] }
     }
 
-    /// Both ways along a line of four frames, where the way back has frame 2 at `x`.
-    fn joined(x: f64) -> Vec<f64> {
-        let forwards = [0.0, 1.0, 2.0, 3.004].map(at);
-        let backwards = [0.0, 1.0, x, 3.0].map(at);
-        let mut edges = Vec::new();
-        for frame in 1..4 {
-            edges.extend(edge(frame, &measured(0), |k| forwards[k], 1.0, false));
-        }
-        for frame in 0..3 {
-            edges.extend(edge(frame, &measured(3), |k| backwards[k], 1.0, true));
-        }
-        let poses = joined_poses(forwards.to_vec(), edges).unwrap();
-        poses.iter().map(|pose| pose.translation.x).collect()
+    /// Both ways along a line of five frames, which have them at `forwards`, from the first, and at `backwards`, from the last but
+    /// one, a keyframe of the way back.
+    fn line(forwards: [f64; 5], backwards: [f64; 5]) -> Joined {
+        let [forwards, backwards] = [forwards, backwards].map(|way| way.map(at));
+        let ways: Vec<_> = (0..5)
+            .map(|frame| {
+                let keyframe = if frame < 3 { 3 } else { 4 };
+                let back = edge(frame, &measured(keyframe), |k| backwards[k], 1.0, true);
+                [edge(frame, &measured(0), |k| forwards[k], 1.0, back.is_some()), back]
+            })
+            .collect();
+        joined(forwards.to_vec(), &ways, &[]).unwrap()
+    }
+
+    fn places(joined: &Joined) -> Vec<f64> {
+        joined.world_from_mid.iter().map(|pose| pose.translation.x).collect()
     }
 
     #[test]
     fn both_ways_share_what_they_differ_by() {
-        let poses = joined(2.0);
-        // Three ways lead from frame 0 to frame 3: one of 3.004, and by frames 1 and 2 and straight back, of 3.000.
-        assert!((3.0..3.003).contains(&poses[3]), "{poses:?}");
-        assert!(poses[3] > 3.0005, "{poses:?}");
+        let joined = line([0.0, 1.0, 2.0, 3.004, 4.0], [0.0, 1.0, 2.0, 3.0, 4.0]);
+        let places = places(&joined);
+        // One way leads from frame 0 to frame 3 over 3.004, four over 3.000: straight back, and by frames 1, 2 and 4.
+        assert!(places[3] > 3.0005 && places[3] < 3.003, "{places:?}");
+        assert_eq!(joined.agrees, [[true; 2]; 5]);
     }
 
     #[test]
-    fn a_frame_that_the_way_back_mistook_stays_where_it_was() {
-        let poses = joined(2.3);
-        assert!((poses[2] - 2.0).abs() < 0.01, "{poses:?}");
-        assert!((poses[3] - 3.0).abs() < 0.01, "{poses:?}");
+    fn what_contradicts_more_of_the_rest_is_left_out_whichever_way_said_it() {
+        let right = [0.0, 1.0, 2.0, 3.0, 4.0];
+        for (forwards, backwards, mistaken) in
+            [([0.0, 1.0, 2.0, 3.3, 4.0], right, [3, 0]), (right, [0.3, 1.0, 2.0, 3.0, 4.0], [0, 1])]
+        {
+            let joined = line(forwards, backwards);
+            assert!((places(&joined)[3] - 3.0).abs() < 0.01, "{:?}", places(&joined));
+            let mut agrees = [[true; 2]; 5];
+            agrees[mistaken[0]][mistaken[1]] = false;
+            assert_eq!(joined.agrees, agrees);
+        }
+    }
+
+    #[test]
+    fn a_place_that_is_seen_again_takes_the_drift_away() {
+        // Each frame is known by the one before, and the way has become longer by a centimetre.
+        let way = [0.0, 1.0, 2.0, 1.01, 0.01].map(at);
+        let ways: Vec<_> = (0..5_usize)
+            .map(|k| [edge(k, &measured(k.saturating_sub(1)), |k| way[k], 1.0, false), None])
+            .collect();
+        let again = |x: f64| edge(4, &measured(0), |k| if k == 4 { at(x) } else { at(0.0) }, 0.1, true);
+        let end = |again: Option<PoseGraphEdge>| {
+            let joined = joined(way.to_vec(), &ways, &Vec::from_iter(again)).unwrap();
+            places(&joined)[4]
+        };
+        assert!((end(None) - 0.01).abs() < 1e-9);
+        assert!(end(again(0.0)).abs() < 1e-3);
+        // Another place that looks alike.
+        assert!((end(again(0.7)) - 0.01).abs() < 1e-6);
+    }
+
+    #[test]
+    fn of_two_that_contradict_each_other_the_more_certain_is_believed() {
+        for certain in [0, 1] {
+            let edges = [0, 1].map(|way| PoseGraphEdge {
+                from: 0,
+                to: 1,
+                from_from_to: at(1.0 + 0.3 * way as f64),
+                translation_sigma: if way == certain { 1e-3 } else { 3e-3 },
+                rotation_sigma: 1e-3,
+                robust: true,
+            });
+            let joined = joined(vec![at(0.0), at(1.0)], &[[None, None], edges.map(Some)], &[]).unwrap();
+            assert!((places(&joined)[1] - (1.0 + 0.3 * certain as f64)).abs() < 1e-6);
+            assert_eq!(joined.agrees[1], [certain == 0, certain == 1]);
+        }
+    }
+
+    #[test]
+    fn what_nothing_ties_any_more_is_noticed() {
+        let tie = |from: usize, to: usize| edge(to, &measured(from), |_| at(0.0), 1.0, true).unwrap();
+        let graph =
+            PoseGraph { world_from_keyframe: vec![at(0.0); 4], edges: vec![tie(0, 1), tie(1, 2), tie(0, 2)] };
+        // Nothing ever tied frame 3.
+        assert!(is_connected(&graph, &[]) && is_connected(&graph, &[1]));
+        assert!(!is_connected(&graph, &[1, 2]));
     }
 
     #[test]
@@ -122,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn exposures_meet_in_the_middle_around_the_joined_pose() {
+    fn exposures_meet_in_the_middle_around_the_joined_pose_unless_one_is_mistaken() {
         let exposure = |start: f64, mid: f64, end: f64| TimedExposure {
             timestamp: 1.0,
             start: at(start),
@@ -135,9 +258,14 @@ mod tests {
             blur_px: 3.0,
             measured: measured(0),
         };
-        let joined = joined_exposure(&exposure(1.9, 2.0, 2.1), Some(&back), &at(3.0));
-        assert_eq!(joined.timestamp, 1.0);
-        assert!((joined.start.translation.x - 2.85).abs() < 1e-12);
-        assert!((joined.end.translation.x - 3.15).abs() < 1e-12);
+        let forwards = exposure(1.9, 2.0, 2.1);
+        for (back, forwards_agrees, half) in
+            [(Some(&back), true, 0.15), (Some(&back), false, 0.2), (None, true, 0.1)]
+        {
+            let joined = Ends { forwards: &forwards, forwards_agrees, back }.around(&at(3.0));
+            assert_eq!(joined.timestamp, 1.0);
+            assert!((joined.start.translation.x - (3.0 - half)).abs() < 1e-12);
+            assert!((joined.end.translation.x - (3.0 + half)).abs() < 1e-12);
+        }
     }
 }

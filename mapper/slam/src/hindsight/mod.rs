@@ -7,6 +7,7 @@
 mod backwards;
 mod joined;
 mod motions;
+mod revisits;
 mod sightings;
 mod smoother;
 
@@ -16,11 +17,12 @@ use mba_adjust::pose_graph::PoseGraphEdge;
 use mba_io::dataset::{Dataset, survey};
 use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
-use mba_tracker::{ExpectedPath, FrameStatus};
+use mba_tracker::{ExpectedPath, FrameStatus, TrackerConfig};
 
 use crate::run::{FrameRecord, RunWriter};
 use crate::tracking::{Measured, TrackingError, TrackingOptions, tracker_config};
 use backwards::SeenBackwards;
+use joined::{Ends, Joined};
 use motions::Motions;
 use sightings::Sighting;
 
@@ -58,17 +60,16 @@ pub fn look_back(
     let expected = expected_paths(dataset, run);
     let seen = backwards::track_backwards(dataset, options, &expected, observe)?;
     let forwards: Vec<RigidTransform> = run.exposures().iter().map(|exposure| exposure.mid).collect();
-    let edges = edges(dataset, run, measured, &forwards, &seen);
+    let ways = edges(dataset, run, measured, &forwards, &seen);
     // A graph that cannot be solved has numbers that make no sense, as those of a run that tracked nothing.
-    let Ok(poses) = joined::joined_poses(forwards, edges) else { return Ok(()) };
-    for (frame, pose) in poses.iter().enumerate() {
-        let (record, exposure) = (run.frames()[frame], run.exposures()[frame]);
-        if !is_found(&record) {
-            continue;
-        }
-        let back = seen[frame].as_ref().filter(|back| back.status == FrameStatus::Ok);
-        let blur_px = back.map_or(record.blur_px, |back| 0.5 * (record.blur_px + back.blur_px));
-        run.revise(frame, joined::joined_exposure(&exposure, back, pose), blur_px);
+    let Ok(both) = joined::joined(forwards.clone(), &ways, &[]) else { return Ok(()) };
+    revise(run, &seen, &both);
+    let again = places_seen_again(dataset, options, run);
+    if !again.is_empty()
+        && let Ok(all) = joined::joined(forwards, &ways, &again)
+    {
+        let moves = |frame: usize| all.world_from_mid[frame].compose(&both.world_from_mid[frame].inverse());
+        run.move_world(moves);
     }
     Ok(())
 }
@@ -79,36 +80,76 @@ fn is_worthwhile(dataset: &Dataset, options: &TrackingOptions, run: &RunWriter) 
     if found.len() < 2 || !dataset.has_images() {
         return false;
     }
-    let readout = tracker_config(dataset, options).readout;
-    let has_other_times = readout.colour != 0.0 || readout.depth != 0.0 || readout.depth_apart;
-    has_other_times || quantile(&found, 0.5).is_some_and(|blur| blur >= WORTHWHILE_BLUR)
+    has_other_times(&tracker_config(dataset, options))
+        || quantile(&found, 0.5).is_some_and(|blur| blur >= WORTHWHILE_BLUR)
+}
+
+/// Whether rows, or depth, are measured at other times than the middle of the image.
+fn has_other_times(config: &TrackerConfig) -> bool {
+    let readout = config.readout;
+    readout.colour != 0.0 || readout.depth != 0.0 || readout.depth_apart
 }
 
 fn is_found(record: &FrameRecord) -> bool {
     record.status != FrameStatus::Lost
 }
 
-/// What both ways measured. The first way is believed; what the way back says is left out where it contradicts the rest.
+/// What keyframes measure of places that were seen long before; nothing where rows or depth have times of their own, which
+/// only the tracker puts right.
+fn places_seen_again(dataset: &Dataset, options: &TrackingOptions, run: &RunWriter) -> Vec<PoseGraphEdge> {
+    let config = tracker_config(dataset, options);
+    if has_other_times(&config) {
+        return Vec::new();
+    }
+    let is_certain = |index: usize| run.frames()[index].status == FrameStatus::Ok;
+    let keyframes: Vec<usize> =
+        run.keyframes().into_iter().map(|(index, _)| index).filter(|index| is_certain(*index)).collect();
+    revisits::revisits(dataset, &config, &keyframes, run.exposures())
+}
+
+/// Gives the frames of a run the poses and exposures that agree best with both ways.
+fn revise(run: &mut RunWriter, seen: &[Option<SeenBackwards>], joined: &Joined) {
+    for (frame, pose) in joined.world_from_mid.iter().enumerate() {
+        let (record, exposure) = (run.frames()[frame], run.exposures()[frame]);
+        if !is_found(&record) {
+            continue;
+        }
+        let [forwards_agrees, back_agrees] = joined.agrees[frame];
+        let back = seen[frame].as_ref().filter(|back| back.status == FrameStatus::Ok && back_agrees);
+        let blur_px = match back {
+            Some(back) if forwards_agrees => 0.5 * (record.blur_px + back.blur_px),
+            Some(back) => back.blur_px,
+            None => record.blur_px,
+        };
+        let ends = Ends { forwards: &exposure, forwards_agrees, back };
+        run.revise(frame, ends.around(pose), blur_px);
+    }
+}
+
+/// What both ways measured of every frame. A frame that was found on the way back is measured twice, and either may be a
+/// mistake; what was measured once is believed.
 fn edges(
     dataset: &Dataset,
     run: &RunWriter,
     measured: &[Measured],
     forwards: &[RigidTransform],
     seen: &[Option<SeenBackwards>],
-) -> Vec<PoseGraphEdge> {
+) -> Vec<[Option<PoseGraphEdge>; 2]> {
     let rolls = dataset.calibration().readout.readout_seconds().is_some_and(|seconds| seconds != 0.0);
     let first = run.frames().iter().position(is_found).unwrap_or(0);
-    let mut edges = Vec::new();
-    for (frame, _) in run.frames().iter().enumerate().filter(|(_, record)| is_found(record)) {
+    let both = |(frame, record): (usize, &FrameRecord)| {
+        if !is_found(record) {
+            return [None, None];
+        }
+        let back = seen[frame].as_ref().filter(|back| back.status == FrameStatus::Ok).and_then(|back| {
+            let mid = |k: usize| seen[k].map_or(back.exposure.mid, |seen| seen.exposure.mid);
+            joined::edge(frame, &back.measured, mid, 1.0, true)
+        });
         let is_bent = rolls && measured[frame].reference == first;
         let factor = if is_bent { joined::FIRST_KEYFRAME } else { 1.0 };
-        edges.extend(joined::edge(frame, &measured[frame], |k| forwards[k], factor, false));
-        if let Some(back) = seen[frame].as_ref().filter(|back| back.status == FrameStatus::Ok) {
-            let mid = |k: usize| seen[k].map_or(back.exposure.mid, |seen| seen.exposure.mid);
-            edges.extend(joined::edge(frame, &back.measured, mid, 1.0, true));
-        }
-    }
-    edges
+        [joined::edge(frame, &measured[frame], |k| forwards[k], factor, back.is_some()), back]
+    };
+    run.frames().iter().enumerate().map(both).collect()
 }
 
 /// How the camera moves around every frame that was tracked for certain.

@@ -130,7 +130,17 @@ pub fn exit_code(error: &anyhow::Error) -> u8 {
 /// `error: ...` with its causes on one line and, where there is advice, `hint: ...` on the next.
 #[must_use]
 pub fn message(error: &anyhow::Error) -> String {
-    let mut text = String::from("error: ");
+    let text = format!("error: {}", causes(error));
+    match hint(error) {
+        Some(hint) => format!("{text}\nhint: {hint}"),
+        None => text,
+    }
+}
+
+/// An error and what caused it, on one line.
+#[must_use]
+pub fn causes(error: &anyhow::Error) -> String {
+    let mut text = String::new();
     let mut last = String::new();
     for cause in error.chain().map(|cause| cause.to_string().replace('\n', " ")) {
         // Many libraries repeat the cause inside their own message.
@@ -142,13 +152,12 @@ pub fn message(error: &anyhow::Error) -> String {
             last = cause;
         }
     }
-    match hint(error) {
-        Some(hint) => format!("{text}\nhint: {hint}"),
-        None => text,
-    }
+    text
 }
 
-fn hint(error: &anyhow::Error) -> Option<&str> {
+/// The advice of an error, where there is one.
+#[must_use]
+pub fn hint(error: &anyhow::Error) -> Option<&str> {
     if let Some(bad) = error.downcast_ref::<BadInput>() {
         return (!bad.hint.is_empty()).then_some(&bad.hint);
     }

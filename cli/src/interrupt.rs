@@ -74,6 +74,31 @@ pub fn flow() -> ControlFlow<()> {
     if FIRST.load(Ordering::SeqCst) == 0 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
 }
 
+/// Asks what is at work in this process to stop, as Ctrl-C asks the program: for a program that calls its commands and has
+/// signal handlers of its own. It holds until [`withdraw`] is called.
+pub fn ask() {
+    /// What Ctrl-C sends on every system.
+    const INTERRUPT: i32 = 2;
+    FIRST.store(INTERRUPT, Ordering::SeqCst);
+}
+
+/// Takes [`ask`] back.
+pub fn withdraw() {
+    FIRST.store(0, Ordering::SeqCst);
+}
+
+/// What unwinds a command that was given up.
+#[derive(Debug)]
+pub(crate) struct GivenUp;
+
+/// Ends a command that has nothing to save and was asked to stop, by unwinding to whoever called it. In the program itself a
+/// signal has ended the process before.
+pub(crate) fn give_up_if_asked() {
+    if flow().is_break() && !SAVES.load(Ordering::SeqCst) {
+        std::panic::resume_unwind(Box::new(GivenUp));
+    }
+}
+
 /// The exit code of a command that stopped because [`flow`] said so.
 #[must_use]
 pub fn exit_code() -> u8 {

@@ -11,8 +11,11 @@ use clap::Parser;
 pub mod args;
 pub mod commands;
 pub mod console;
+pub mod embedded;
 pub mod failure;
 pub mod interrupt;
+pub mod itself;
+pub mod progress;
 pub mod report;
 pub mod written_run;
 
@@ -21,19 +24,24 @@ use console::Console;
 
 /// Parses the command line (program name first), runs the command, reports an error and returns the exit code.
 pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    ExitCode::from(exit_code(arguments))
+}
+
+/// As [`main`], with the exit code as a number.
+pub fn exit_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are "errors" of the parser too and have exit code 0. A closed pipe is nobody's loss.
             let _ = error.print();
-            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+            return u8::try_from(error.exit_code()).unwrap_or(2);
         }
     };
     match run(&cli) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             eprintln!("{}", failure::message(&error));
-            ExitCode::from(failure::exit_code(&error))
+            failure::exit_code(&error)
         }
     }
 }
@@ -44,9 +52,12 @@ pub fn main(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 /// Whatever stops the command; [`failure::exit_code`] tells bad input from failure.
 pub fn run(cli: &Cli) -> anyhow::Result<()> {
     interrupt::watch();
-    let console = Console::new(&cli.global);
+    run_with(cli, &Console::new(&cli.global))
+}
+
+fn run_with(cli: &Cli, console: &Console) -> anyhow::Result<()> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads(cli.global.threads)).build()?;
-    pool.install(|| dispatch(&cli.command, &console))
+    pool.install(|| dispatch(&cli.command, console))
 }
 
 /// Number of worker threads; 0 for as many as the thread pool chooses itself, which listens to the environment.

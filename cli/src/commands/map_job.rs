@@ -1,7 +1,7 @@
 //! `mba map JOB`: one group, or all of them in processes of their own.
 
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -18,6 +18,7 @@ use crate::args::map::Map;
 use crate::console::Console;
 use crate::failure::{TRY_AGAIN, failed, interrupted, try_again};
 use crate::interrupt::{self, Resumption};
+use crate::itself;
 use crate::report::table as tables;
 use crate::written_run::{self, absolute, note_written};
 
@@ -160,7 +161,7 @@ fn free_memory_bytes() -> Option<u64> {
 
 /// Starts the process of one group.
 fn start(job: &Path, group: usize, threads: usize, interval: Duration) -> anyhow::Result<Child> {
-    let mut command = Command::new(std::env::current_exe()?);
+    let mut command = itself::command()?;
     command.arg("map").arg(job).args(["--submap", &group.to_string(), "--quiet"]);
     command.args(["--threads", &threads.to_string()]);
     command.args(["--checkpoint-interval", &interval.as_secs_f64().to_string()]);

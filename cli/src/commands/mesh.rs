@@ -3,7 +3,6 @@
 use std::path::Path;
 use std::time::Instant;
 
-use indicatif::ProgressBar;
 use mba_mapper::map::Scene;
 use mba_mapper::map::StoredMap;
 use mba_mapper::mesh::{MeshFormat, YAxis};
@@ -20,6 +19,7 @@ use super::open;
 use crate::args::surface::MeshArgs;
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input, failed, is_disk_full};
+use crate::progress::Progress;
 use crate::report::table::pairs;
 use crate::written_run::refuse;
 
@@ -144,7 +144,7 @@ fn keyframe_poses(run: &Run) -> anyhow::Result<Vec<RigidTransform>> {
 /// Views that are counted.
 struct Watched<'a> {
     views: MapViews<'a>,
-    progress: ProgressBar,
+    progress: Progress,
 }
 
 impl ViewSource for Watched<'_> {

@@ -1,13 +1,15 @@
 //! `mba synth`.
 
+use std::ops::ControlFlow;
 use std::path::Path;
 
-use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset};
+use mba_mapper::synth::{SynthConfig, SynthError, SynthSequence, write_dataset_while};
 use serde::Serialize;
 
 use crate::args::synth::Synth;
 use crate::console::Console;
-use crate::failure::{OrBadInput, is_disk_full};
+use crate::failure::{OrBadInput, interrupted, is_disk_full};
+use crate::interrupt::{self, Resumption};
 use crate::report::table::pairs;
 use crate::written_run::{OUT_HINT, refuse};
 
@@ -40,7 +42,11 @@ pub fn synthesise(config: SynthConfig, out: &Path, console: &Console) -> anyhow:
     console.detail(format!("{config:?}"));
     let sequence = SynthSequence::new(config).or_else(advise)?;
     let progress = console.progress(sequence.len(), "rendering");
-    let summary = write_dataset(&sequence, out, |_, _| progress.inc(1));
+    let summary = write_dataset_while(&sequence, out, |_, _| {
+        interrupt::flow()?;
+        progress.inc(1);
+        ControlFlow::Continue(())
+    });
     progress.finish_and_clear();
     let summary = summary.or_else(advise)?;
     Ok(Written {
@@ -56,6 +62,7 @@ fn advise<T>(error: SynthError) -> anyhow::Result<T> {
     let hint = match error {
         SynthError::File(error) if is_disk_full(&error) => return Err(error.into()),
         SynthError::Output(error) => return refuse(error),
+        SynthError::Stopped => return Err(interrupted(error.to_string(), Resumption::Never.advice())),
         SynthError::File(_) => OUT_HINT,
         SynthError::FolderNotEmpty { .. } => "nothing that exists is overwritten",
         _ => "see `mba synth --help` for the ranges",

@@ -62,6 +62,9 @@ pub enum SynthError {
         /// Mean blur without hand shake, pixels.
         least: f64,
     },
+    /// Whoever watches asked for it; nothing is left in the folder.
+    #[error("stopped on request")]
+    Stopped,
     /// The target folder has something in it.
     #[error("{folder} is not empty; name a new folder")]
     FolderNotEmpty {

@@ -54,4 +54,4 @@ pub use error::SynthError;
 pub use events::{Events, FrameRanges};
 pub use sequence::{SynthFrame, SynthSequence};
 pub use summary::SynthSummary;
-pub use writer::write_dataset;
+pub use writer::{write_dataset, write_dataset_while};

@@ -362,3 +362,16 @@ fn written_sequence_opens_as_a_data_set() {
     let again = super::write_dataset(&sequence, &path, |_, _| ()).unwrap_err();
     assert!(matches!(again, SynthError::FolderNotEmpty { .. }), "{again}");
 }
+
+#[test]
+fn a_sequence_that_was_stopped_leaves_nothing() {
+    use std::ops::ControlFlow;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("room");
+    let sequence = sequence(SynthConfig { frames: 3, ..small() });
+    let stop = |done, _| if done < 2 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
+    let stopped = super::write_dataset_while(&sequence, &path, stop).unwrap_err();
+    assert!(matches!(stopped, SynthError::Stopped), "{stopped}");
+    assert!(!path.exists());
+    super::write_dataset(&sequence, &path, |_, _| ()).unwrap();
+}

@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::fs;
 use std::io;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -71,8 +72,25 @@ pub fn write_dataset(
     folder: &Path,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<SynthSummary, SynthError> {
+    let go_on = |done, frames| {
+        progress(done, frames);
+        ControlFlow::Continue(())
+    };
+    write_dataset_while(sequence, folder, go_on)
+}
+
+/// As [`write_dataset`], as long as `go_on(done, frames)` says so.
+///
+/// # Errors
+///
+/// As [`write_dataset`], and [`SynthError::Stopped`] when it was told to stop.
+pub fn write_dataset_while(
+    sequence: &SynthSequence,
+    folder: &Path,
+    go_on: impl Fn(usize, usize) -> ControlFlow<()> + Sync,
+) -> Result<SynthSummary, SynthError> {
     let claimed = prepare(folder)?;
-    let summary = write_all(sequence, folder, progress).inspect_err(|_| clear(folder))?;
+    let summary = write_all(sequence, folder, go_on).inspect_err(|_| clear(folder))?;
     drop(claimed);
     Ok(summary)
 }
@@ -80,7 +98,7 @@ pub fn write_dataset(
 fn write_all(
     sequence: &SynthSequence,
     folder: &Path,
-    progress: impl Fn(usize, usize) + Sync,
+    go_on: impl Fn(usize, usize) -> ControlFlow<()> + Sync,
 ) -> Result<SynthSummary, SynthError> {
     let truth = (!sequence.config().sensor.is_on_record).then_some(TRUTH_FOLDER);
     for name in IMAGE_FOLDERS.into_iter().chain(truth) {
@@ -90,8 +108,10 @@ fn write_all(
     let done = AtomicUsize::new(0);
     let write_counted = |index| {
         let written = write_frame(sequence, folder, index)?;
-        progress(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.len());
-        Ok(written)
+        match go_on(done.fetch_add(1, Ordering::Relaxed) + 1, sequence.len()) {
+            ControlFlow::Continue(()) => Ok(written),
+            ControlFlow::Break(()) => Err(SynthError::Stopped),
+        }
     };
     // Frames side by side, in their order.
     let written: Vec<_> =

@@ -117,7 +117,13 @@ fn splats(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
     let permission = Permission { force: args.force, inputs: &inputs };
     let out = OutputFile::claim(&args.out, &permission, is_own_splats).or_else(refuse)?;
     let response = camera.inverse_response().or_bad_input("make the run again")?;
-    let viewing = for_viewers(&map, camera.pinhole(), &response, &run.exposures, &run.frames);
+    let viewing = for_viewers(
+        &map,
+        camera.pinhole(),
+        &response,
+        run.summary.upright.as_ref(),
+        (&run.exposures, &run.frames),
+    );
     out.write(&format_ply_for_viewers(&map, &viewing)).or_else(unwritable)?;
     let lost = run.frames.iter().filter(|frame| frame.status == FrameStatus::Lost).count();
     let written = written(args, run.frames.len() - lost, lost, Some(map.len()));

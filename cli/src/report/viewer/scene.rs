@@ -91,7 +91,7 @@ impl Scene {
             curve: curve(&DisplayCurve::new(&camera.inverse_response()?)),
             scales: SCALES,
             colours: COLOURS,
-            up: up_direction(&run.exposures, &run.frames).into(),
+            up: up_direction(run.summary.upright.as_ref(), &run.exposures, &run.frames).into(),
             size: size(map, &start),
             start: Pose::from(&start),
             exposures: tracked.map(|(exposure, _)| places(exposure)).collect(),

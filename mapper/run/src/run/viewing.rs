@@ -9,7 +9,7 @@ use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;
 
 use super::orientation::{start_view, up_direction};
-use super::{FrameRecord, FrameStatus};
+use super::{FrameRecord, FrameStatus, Upright};
 
 /// The first line of the header after the format.
 const TITLE: &str =
@@ -17,14 +17,14 @@ const TITLE: &str =
 
 /// Colours and sizes for viewers, fitted to the keyframes of a run, and comments that say which way is up and where to start.
 ///
-/// `camera` and `response` are those of the run, `exposures` and `frames` its rows.
+/// `camera` and `response` are those of the run, `upright` is what it knows of up, and `exposures` and `frames` are its rows.
 #[must_use]
 pub fn for_viewers(
     map: &Gaussians,
     camera: PinholeCamera,
     response: &InverseResponse,
-    exposures: &[TimedExposure],
-    frames: &[FrameRecord],
+    upright: Option<&Upright>,
+    (exposures, frames): (&[TimedExposure], &[FrameRecord]),
 ) -> ForViewers {
     let poses = |all: bool| -> Vec<RigidTransform> {
         let rows = exposures.iter().zip(frames);
@@ -35,7 +35,7 @@ pub fn for_viewers(
     let keyframes = poses(false);
     let poses = if keyframes.is_empty() { poses(true) } else { keyframes };
     let ViewerSplats { colours, log_scales } = viewer_splats(map, camera, &poses, response, SimdLevel::new());
-    let comments = comments(&up_direction(exposures, frames), start_view(exposures, frames));
+    let comments = comments(&up_direction(upright, exposures, frames), start_view(exposures, frames));
     ForViewers { colours, log_scales, comments }
 }
 

@@ -151,6 +151,12 @@ impl RunWriter {
         self.upright = Some(upright);
     }
 
+    /// How it is known that the world's z axis points up, if it is.
+    #[must_use]
+    pub fn upright(&self) -> Option<&Upright> {
+        self.upright.as_ref()
+    }
+
     /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map.
     ///
     /// # Panics

@@ -74,7 +74,13 @@ fn write_map(writer: &RunWriter, dataset: &Dataset, bundle: &BundleAdjustment) -
     };
     let calibration = dataset.calibration();
     let response = calibration.response.inverse();
-    let viewing = for_viewers(map, calibration.camera, &response, writer.exposures(), writer.frames());
+    let viewing = for_viewers(
+        map,
+        calibration.camera,
+        &response,
+        writer.upright(),
+        (writer.exposures(), writer.frames()),
+    );
     writer.write_map_for_viewers(map, &viewing)
 }
 

@@ -12,7 +12,9 @@ import { createRequire } from 'node:module';
 import { dirname, join, normalize } from 'node:path';
 import { fileURLToPath } from 'node:url';
 
-const [packages, page, map, camera, poses, out, density = 1] = process.argv.slice(2);
+const [packages, asked, map, camera, poses, out, density = 1] = process.argv.slice(2);
+// What follows `#` is for the page of `mba view`.
+const [page, how = ''] = asked.split('#');
 const here = dirname(fileURLToPath(import.meta.url));
 const puppeteer = createRequire(join(packages, 'package.json'))('puppeteer-core');
 
@@ -70,7 +72,7 @@ try {
   await tab.setViewport({ width, height, deviceScaleFactor: 1 });
   tab.on('console', (message) => { if (message.type() === 'error') errors.push(message.text()); });
   tab.on('pageerror', (error) => errors.push(String(error)));
-  await tab.goto(page.startsWith('/') ? `file://${page}#plain` : `http://127.0.0.1:${server.address().port}/${page}`);
+  await tab.goto(page.startsWith('/') ? `file://${page}#plain,${how}` : `http://127.0.0.1:${server.address().port}/${page}`);
   await tab.waitForFunction('window.ready || document.querySelector(".viewer")?.show', { timeout: 120000 });
   mkdirSync(out, { recursive: true });
   for (const line of readFileSync(poses, 'utf8').split('\n').filter((line) => line && !line.startsWith('#'))) {

@@ -1,9 +1,12 @@
-// Puts the parts together. `#frame=12` in the address starts at that keyframe, `#plain` shows the picture alone.
+// Puts the parts together. `#frame=12` in the address starts at that keyframe, `#plain` shows the picture alone, `#painted`
+// draws every picture in the worker.
 
 /** Milliseconds without motion after which the picture is drawn at its full resolution. */
 const REST = 140;
 /** While it moves: least share of the resolution, and milliseconds between pictures that are too many and few enough. */
-const [LEAST_SHARE, SLOW, FAST] = [0.2, 45, 24];
+const [LEAST_SHARE, SLOW, FAST] = [0.2, 60, 40];
+/** Milliseconds for a picture of the full resolution above which pictures that move are painted by the worker. */
+const SLOW_CARD = 60;
 /** Pixels around a keyframe that are its own. */
 const GRIP = 18;
 
@@ -12,13 +15,17 @@ const startViewer = (root) => {
   const data = JSON.parse(part('scene').textContent);
   const map = unpack(part('gaussians').textContent, data);
   const [canvas, lines, picture] = ['map', 'lines', 'picture'].map(part);
-  const splats = new Splats(canvas, map.texels, Float32Array.from(data.curve, (value) => value / 65535));
+  const splats = new Splats(canvas, map.radii.length, Float32Array.from(data.curve, (value) => value / 65535), data.colours);
   const overlay = new Overlay(lines);
-  const worker = startSorter();
-  worker.postMessage({ places: map.places, radii: map.radii });
+  const worker = startProjector();
+  worker.postMessage(map);
 
-  const state = { share: 1, sorting: false, view: 0, sorted: -1, pending: false, last: 0, moved: 0, chosen: -1, marks: [] };
+  // `view` counts poses and sizes; a picture of one is asked for, comes from the projector, and is drawn.
+  const state = { share: 1, view: 0, asked: null, come: null, spare: null, pending: false, last: 0, moved: 0, chosen: -1, marks: [] };
   const settled = [];
+  const isAlwaysPainted = /painted/.test(location.hash) && splats.isHalf;
+  // Whether the graphics card is, or whether there is none; unknown before the first picture.
+  let isSlow = null;
   let rest = 0;
 
   const eye = new Eye(map.places, data.up, (byPerson) => {
@@ -48,19 +55,43 @@ const startViewer = (root) => {
     };
   };
 
-  const sort = (view) => {
-    if (state.sorting || state.sorted === state.view) return;
-    state.sorting = true;
-    const reach = [0, 1].map((k) => {
-      const side = k ? canvas.height : canvas.width;
-      return 1.05 * Math.max(view.centre[k] + 1, side - view.centre[k]) / view.focal[k];
-    });
-    worker.postMessage({ view: state.view, axes: view.axes, place: view.place, reach, near: 0.01 });
+  // While nothing moves the picture has the full resolution.
+  const share = () => performance.now() - state.moved >= REST ? 1 : state.share;
+
+  // The next picture is projected while the last one is drawn.
+  const ask = () => {
+    const asked = { number: state.view, share: share() };
+    const isKnown = (picture) => picture && picture.number === asked.number && picture.share === asked.share;
+    if (state.asked || isKnown(state.come)) return;
+    const view = camera();
+    const how = projection(view, canvas, asked.share);
+    state.asked = { ...asked, view, size: how.size };
+    const isPainted = isAlwaysPainted || isSlow && asked.share < 1;
+    const spare = isPainted ? null : state.spare;
+    worker.postMessage({ ...how, isPainted, spare }, spare ? [spare] : []);
+    if (spare) state.spare = null;
   };
-  worker.onmessage = ({ data: { sorted, view } }) => {
-    Object.assign(state, { sorting: false, sorted: view });
-    splats.setOrder(sorted);
+  worker.onmessage = ({ data }) => {
+    state.come = { ...state.asked, ...data, isNew: true };
+    state.asked = null;
     request();
+  };
+
+  const put = (picture) => {
+    if (picture.pixels) {
+      splats.drawPainted(picture);
+      return;
+    }
+    splats.draw(picture);
+    if (isSlow === null) {
+      // The first time takes longer: what draws is compiled then.
+      splats.finish();
+      const start = performance.now();
+      splats.draw(picture);
+      splats.finish();
+      isSlow = splats.isHalf && performance.now() - start > SLOW_CARD;
+    }
+    state.spare = picture.corners;
   };
 
   const request = () => {
@@ -71,13 +102,16 @@ const startViewer = (root) => {
 
   const draw = (now) => {
     state.pending = false;
-    const view = camera();
-    sort(view);
-    const isStill = state.sorted === state.view && performance.now() - state.moved >= REST;
-    if (!isStill && now - state.last < 10 * SLOW) adapt(now - state.last);
-    state.last = now;
-    splats.draw(view, isStill ? 1 : state.share);
-    drawLines(view);
+    const picture = state.come;
+    if (picture?.isNew) {
+      put(picture);
+      picture.isNew = false;
+      if (picture.number !== state.view) adapt(now - state.last);
+      state.last = now;
+    }
+    ask();
+    if (picture) drawLines(picture.view);
+    const isStill = picture?.number === state.view && picture.share === 1 && !state.asked;
     if (isStill) settled.splice(0).forEach((done) => done());
   };
 
@@ -162,14 +196,15 @@ const startViewer = (root) => {
 
   const resize = () => {
     const ratio = Math.min(2, devicePixelRatio);
-    for (const sheet of [canvas, lines]) {
-      sheet.width = Math.max(1, Math.round(canvas.clientWidth * ratio));
-      sheet.height = Math.max(1, Math.round(canvas.clientHeight * ratio));
-    }
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((side) => Math.max(1, Math.round(side * ratio)));
+    if (state.view > 0 && canvas.width === width && canvas.height === height) return;
+    for (const sheet of [canvas, lines]) Object.assign(sheet, { width, height });
+    // A canvas of another size is empty: the last picture is stretched until the next one comes.
+    if (splats.size[0] > 0) splats.show();
     const { scale, border } = camera();
     const lengths = [border[0], border[1], data.camera.width * scale, data.camera.height * scale];
-    const [left, top, width, height] = lengths.map((pixels) => `${pixels / ratio}px`);
-    Object.assign(picture.style, { left, top, width, height });
+    const [left, top, wide, high] = lengths.map((pixels) => `${pixels / ratio}px`);
+    Object.assign(picture.style, { left, top, width: wide, height: high });
     state.view += 1;
     state.moved = 0;
     request();

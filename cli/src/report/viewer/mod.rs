@@ -21,9 +21,10 @@ const STYLE: &str = include_str!("viewer.css");
 const ELEMENTS: &str = include_str!("viewer.html");
 
 /// Each uses those before it.
-const SCRIPTS: [&str; 8] = [
+const SCRIPTS: [&str; 9] = [
     include_str!("motion.js"),
-    include_str!("sorter.js"),
+    include_str!("painter.js"),
+    include_str!("projector.js"),
     include_str!("splats.js"),
     include_str!("unpack.js"),
     include_str!("overlay.js"),

@@ -1,61 +1,17 @@
 // Draws Gaussians with WebGL2 as `mba render` does: blended in linear light, then turned into what displays show.
 
-/** Floats of a Gaussian in the texture: centre, opacity, six of its covariance, colour. */
-const FLOATS = 16;
-/** Texels in a row of that texture: a multiple of four, so that a Gaussian lies in one row. */
-const ROW = 2048;
-
 const GAUSSIANS_VERTEX = `#version 300 es
 precision highp float;
-precision highp sampler2D;
-precision highp usampler2D;
-uniform sampler2D gaussians;
-uniform usampler2D order;
-uniform mat3 axes;
-uniform vec3 place;
-uniform vec4 camera;
-uniform vec4 limits;
-uniform vec2 size;
-uniform float lowPass;
+layout(location = 0) in vec2 place;
+layout(location = 1) in vec4 code;
+uniform vec2 colours;
 out vec2 offset;
 flat out vec4 colour;
 void main() {
-  gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
-  int quad = gl_VertexID >> 2;
-  int first = int(texelFetch(order, ivec2(quad % ${ROW}, quad / ${ROW}), 0).r) * 4;
-  ivec2 at = ivec2(first % ${ROW}, first / ${ROW});
-  vec4 a = texelFetch(gaussians, at, 0);
-  vec4 b = texelFetch(gaussians, at + ivec2(1, 0), 0);
-  vec4 c = texelFetch(gaussians, at + ivec2(2, 0), 0);
-  vec4 d = texelFetch(gaussians, at + ivec2(3, 0), 0);
-  vec3 seen = (a.xyz - place) * axes;
-  // The projection is linearised at the centre, but not far beyond the border of the image.
-  vec2 slope = clamp(seen.xy / seen.z, limits.xy, limits.zw);
-  vec2 scale = camera.xy / seen.z;
-  vec3 toX = axes * vec3(scale.x, 0.0, -scale.x * slope.x);
-  vec3 toY = axes * vec3(0.0, scale.y, -scale.y * slope.y);
-  mat3 covariance = mat3(b.x, b.y, b.z, b.y, b.w, c.x, b.z, c.x, c.y);
-  vec3 spread = covariance * toX;
-  // A splat is never thinner than about a pixel of the recording: there is no more detail in the map.
-  float xx = dot(spread, toX) + lowPass;
-  float xy = dot(spread, toY);
-  float yy = dot(covariance * toY, toY) + lowPass;
-  // Up to where it is fainter than a step of eight bits.
-  float reach2 = 2.0 * log(255.0 * a.w);
-  if (reach2 <= 0.0) return;
-  float middle = 0.5 * (xx + yy);
-  float apart = length(vec2(0.5 * (xx - yy), xy));
-  float longest = middle + apart;
-  float shortest = max((xx * yy - xy * xy) / longest, 1e-6);
-  vec2 along = apart < 1e-6 * middle ? vec2(1.0, 0.0)
-    : normalize(xx > yy ? vec2(longest - yy, xy) : vec2(xy, longest - xx));
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0;
-  offset = corner * sqrt(reach2);
-  vec2 pixel = camera.xy * seen.xy / seen.z + camera.zw
-    + offset.x * sqrt(longest) * along + offset.y * sqrt(shortest) * vec2(-along.y, along.x);
-  vec2 screen = (pixel + 0.5) / size * 2.0 - 1.0;
-  gl_Position = vec4(screen.x, -screen.y, 0.0, 1.0);
-  colour = vec4(c.zw, d.x, a.w);
+  gl_Position = vec4(place, 0.0, 1.0);
+  // In standard deviations; the corners of a splat are where it is fainter than a step of eight bits.
+  offset = (vec2(gl_VertexID & 1, gl_VertexID >> 1 & 1) * 2.0 - 1.0) * sqrt(2.0 * log(255.0 * code.a));
+  colour = vec4(mix(vec3(colours.x), vec3(colours.y), code.rgb), code.a);
 }`;
 
 const GAUSSIANS_FRAGMENT = `#version 300 es
@@ -99,8 +55,8 @@ void main() {
 }`;
 
 class Splats {
-  /** `curve` has 1024 display values of light; `gaussians` FLOATS numbers each. */
-  constructor(canvas, gaussians, curve) {
+  /** For at most `count` Gaussians; `curve` has 1024 display values of light, `colours` is what the least and greatest code mean. */
+  constructor(canvas, count, curve, colours) {
     const gl = canvas.getContext('webgl2', { alpha: false, antialias: false, depth: false });
     if (!gl) throw new Error('this browser has no WebGL2');
     this.gl = gl;
@@ -108,21 +64,13 @@ class Splats {
     this.isHalf = Boolean(gl.getExtension('EXT_color_buffer_float') || gl.getExtension('EXT_color_buffer_half_float'));
     this.program = this.link(GAUSSIANS_VERTEX, GAUSSIANS_FRAGMENT);
     this.display = this.link(DISPLAY_VERTEX, DISPLAY_FRAGMENT);
-    this.gaussians = this.texture(gl.NEAREST);
-    const rows = Math.max(1, Math.ceil(gaussians.length / 4 / ROW));
-    const texels = new Float32Array(rows * ROW * 4);
-    texels.set(gaussians);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, rows, 0, gl.RGBA, gl.FLOAT, texels);
     this.curve = this.texture(gl.NEAREST);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, 1024, 1, 0, gl.RED, gl.FLOAT, curve);
     this.light = this.texture(gl.LINEAR);
     this.frame = gl.createFramebuffer();
-    this.order = this.texture(gl.NEAREST);
-    const orderRows = Math.max(1, Math.ceil(gaussians.length / FLOATS / ROW));
-    gl.texStorage2D(gl.TEXTURE_2D, 1, gl.R32UI, ROW, orderRows);
-    this.makeQuads(gaussians.length / FLOATS);
-    this.count = 0;
+    this.colours = colours;
     this.size = [0, 0];
+    this.makeQuads(count);
   }
 
   /** Two triangles for every Gaussian, all in one draw: an instance each takes long without a graphics card. */
@@ -132,6 +80,10 @@ class Splats {
     for (let k = 0; k < count; k++) corners.set([4 * k, 4 * k + 1, 4 * k + 2, 4 * k + 2, 4 * k + 1, 4 * k + 3], 6 * k);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, corners, gl.STATIC_DRAW);
+    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
+    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, CORNER, 0);
+    gl.vertexAttribPointer(1, 4, gl.UNSIGNED_SHORT, true, CORNER, 8);
+    [0, 1].forEach((attribute) => gl.enableVertexAttribArray(attribute));
   }
 
   texture(filter) {
@@ -159,25 +111,9 @@ class Splats {
     return { program, at: Object.fromEntries(names.map((name) => [name, gl.getUniformLocation(program, name)])) };
   }
 
-  /** What is drawn from now on, the farthest first. */
-  setOrder(sorted) {
+  /** Draws `count` splats, whose `corners` the projector computed, on a sheet of `size` pixels that fills the canvas. */
+  draw({ corners, count, size }) {
     const { gl } = this;
-    const rows = Math.ceil(sorted.length / ROW);
-    const texels = new Uint32Array(rows * ROW);
-    texels.set(sorted);
-    gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, this.order);
-    if (rows > 0) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, rows, gl.RED_INTEGER, gl.UNSIGNED_INT, texels);
-    this.count = sorted.length;
-  }
-
-  /** Draws to the whole canvas, at `share` of its resolution. The camera is in pixels of the canvas, `scale` of the recording's. */
-  draw({ axes, place, focal: [fx, fy], centre: [cx, cy], scale }, share) {
-    const { gl } = this;
-    const { width, height } = gl.canvas;
-    const size = [width, height].map((side) => Math.max(1, Math.round(side * share)));
-    const [sx, sy] = [size[0] / width, size[1] / height];
-    const camera = [fx * sx, fy * sy, (cx + 0.5) * sx - 0.5, (cy + 0.5) * sy - 0.5];
     this.resize(size);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.frame);
     gl.viewport(0, 0, ...size);
@@ -185,22 +121,28 @@ class Splats {
     gl.clear(gl.COLOR_BUFFER_BIT);
     const { program, at } = this.program;
     gl.useProgram(program);
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.gaussians);
-    gl.uniform1i(at.gaussians, 0);
-    gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, this.order);
-    gl.uniform1i(at.order, 1);
-    gl.uniformMatrix3fv(at.axes, false, axes.flat());
-    gl.uniform3fv(at.place, place);
-    gl.uniform4fv(at.camera, camera);
-    gl.uniform4fv(at.limits, slopeLimits(size, camera));
-    gl.uniform2fv(at.size, size);
-    gl.uniform1f(at.lowPass, 0.3 * Math.max(1, scale * sx) ** 2);
+    gl.bufferData(gl.ARRAY_BUFFER, new Uint8Array(corners, 0, 4 * CORNER * count), gl.STREAM_DRAW);
+    gl.uniform2fv(at.colours, this.colours);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-    gl.drawElements(gl.TRIANGLES, 6 * this.count, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLES, 6 * count, gl.UNSIGNED_INT, 0);
     this.show();
+  }
+
+  /** The same, of light that was painted: three floats of light for every pixel and one that does not count, rows going up. */
+  drawPainted({ pixels, size }) {
+    const { gl } = this;
+    this.resize(size);
+    gl.activeTexture(gl.TEXTURE0);
+    gl.bindTexture(gl.TEXTURE_2D, this.light);
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ...size, gl.RGBA, gl.FLOAT, pixels);
+    this.show();
+  }
+
+  /** Waits until everything is drawn. */
+  finish() {
+    const { gl } = this;
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 
   /** Light to the canvas. */
@@ -231,12 +173,3 @@ class Splats {
     this.size = size;
   }
 }
-
-/** Slopes of rays, 0.3 of half the image beyond its borders: least x and y, greatest x and y. */
-const slopeLimits = ([width, height], [fx, fy, cx, cy]) => {
-  const [beyondX, beyondY] = [0.15 * width / fx, 0.15 * height / fy];
-  return [
-    (-0.5 - cx) / fx - beyondX, (-0.5 - cy) / fy - beyondY,
-    (width - 0.5 - cx) / fx + beyondX, (height - 0.5 - cy) / fy + beyondY,
-  ];
-};

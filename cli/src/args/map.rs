@@ -69,7 +69,8 @@ pub struct Mapping {
     /// At most this many keyframes; the other frames are fitted to the finished map
     #[arg(long, value_name = "N", default_value_t = default_keyframes())]
     pub max_keyframes: NonZeroUsize,
-    /// At most this many Gaussians; default: a third of the pixels of an image
+    /// At most this many Gaussians; default: a third of the pixels of an image, in a wide scene a tenth of those of all surfaces
+    /// that the keyframes see, but no more than 160000
     #[arg(long, value_name = "N")]
     pub max_gaussians: Option<NonZeroUsize>,
     /// Seconds between two checkpoints; 0 for one after every step

@@ -1,5 +1,6 @@
 //! Joint optimisation of the map and of the paths of all exposures.
 
+use mba_io::statistics::quantile;
 use mba_map::map::{MapKind, Scene, SceneRenderer};
 use mba_raster::losses::{Exposure, LossTerms};
 use mba_raster::sensor::{Observation, ObservationPyramid, Sensor};
@@ -9,6 +10,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
+use super::capacity::SeenSurface;
 use super::frame_state::FrameState;
 use super::map_model::{FitContext, MapModel};
 use super::path_metric::PathMetric;
@@ -197,6 +199,20 @@ impl<M: MapModel> BundleAdjustment<M> {
     #[must_use]
     pub fn max_gaussians(&self) -> usize {
         self.settings.max_gaussians
+    }
+
+    /// What the keyframes see together.
+    #[must_use]
+    pub fn seen_surface(&self) -> SeenSurface {
+        let depths: Vec<f64> = self.keyframes.iter().map(|keyframe| keyframe.depth).collect();
+        let mut surface = SeenSurface::new(quantile(&depths, 0.5).unwrap_or(1.0));
+        for (keyframe, frame) in self.keyframes.iter().zip(&self.state.frames) {
+            // Half of the pixels along each axis are enough to count by.
+            let coarse = keyframe.observation.level(1);
+            let shrink = keyframe.observation.level(0).camera.width / coarse.camera.width.max(1);
+            surface.add(coarse, &frame.path.mid(), shrink);
+        }
+        surface
     }
 
     /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,

@@ -7,6 +7,7 @@
 mod adam;
 mod adjustment;
 mod brightness;
+mod capacity;
 mod density;
 mod disc;
 mod field_map;
@@ -28,6 +29,7 @@ mod world_moves;
 
 pub use adjustment::{BundleAdjustment, BundleSettings, BundleState, MapKeyframe, StepReport};
 pub use brightness::{NOTICEABLE, Placed, log_brightness};
+pub use capacity::SeenSurface;
 pub use field_map::FieldMap;
 pub use frame_state::FrameState;
 pub use gaussian_loss::GaussianLoss;

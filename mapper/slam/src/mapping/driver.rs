@@ -168,8 +168,7 @@ impl Work<'_> {
     /// What a checkpoint has to agree with.
     fn identity(&self) -> Identity {
         let Self { dataset, run, settings, part } = *self;
-        let camera = dataset.calibration().camera;
-        let decisive = settings.decisive(camera.width * camera.height);
+        let decisive = settings.decisive();
         Identity {
             program: Fingerprint::of(&(env!("CARGO_PKG_VERSION"), CHECKPOINT_VERSION)),
             dataset: dataset_fingerprint(dataset),

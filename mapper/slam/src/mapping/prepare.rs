@@ -192,8 +192,12 @@ pub(super) fn bundle(
     let mut states: Vec<FrameState> =
         keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
     set_gains(&sensor, &keyframes, &mut states);
-    let pixels = sensor.camera.width * sensor.camera.height;
-    Ok(BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(pixels), keyframes, states))
+    let picture = sensor.camera.width * sensor.camera.height;
+    let mut bundle = BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(), keyframes, states);
+    if settings.max_gaussians.is_none() {
+        bundle.set_max_gaussians(bundle.seen_surface().gaussians(picture));
+    }
+    Ok(bundle)
 }
 
 /// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.

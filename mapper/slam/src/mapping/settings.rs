@@ -20,7 +20,7 @@ pub struct MapSettings {
     pub virtual_views: Option<usize>,
     /// Most keyframes; further frames are fitted to the finished map. At least 1.
     pub max_keyframes: usize,
-    /// Most Gaussians; `None` for one that fits the image size.
+    /// Most Gaussians; `None` for one that fits what the keyframes see.
     pub max_gaussians: Option<usize>,
     /// Time for all of it; `None` for as many steps as the schedule has, and equal results on all machines of a kind.
     pub time_budget: Option<Duration>,
@@ -46,34 +46,33 @@ impl Default for MapSettings {
     }
 }
 
-/// Image pixels per Gaussian: what a camera sees is described by a third as many Gaussians as it has pixels.
-const PIXELS_PER_GAUSSIAN: usize = 3;
-
 /// The settings that change the result, for the identity of a checkpoint.
 #[derive(Serialize)]
 pub(super) struct Decisive {
     bundle: BundleSettings,
+    max_gaussians: Option<usize>,
     continuity: bool,
     max_keyframes: usize,
     timed: bool,
 }
 
 impl MapSettings {
-    /// Those of the bundle adjustment, for images of that many pixels.
-    pub(crate) fn bundle(&self, pixels: usize) -> BundleSettings {
-        let by_size = (pixels / PIXELS_PER_GAUSSIAN).max(2000);
+    /// Those of the bundle adjustment. Where the number of Gaussians is not asked for, none are allowed until it is known what
+    /// there is to see.
+    pub(crate) fn bundle(&self) -> BundleSettings {
         BundleSettings {
             kind: self.kind,
             blur: self.blur,
             max_views: self.virtual_views.unwrap_or(usize::MAX),
-            max_gaussians: self.max_gaussians.unwrap_or(by_size),
+            max_gaussians: self.max_gaussians.unwrap_or(0),
             seed: self.seed,
         }
     }
 
-    pub(super) fn decisive(&self, pixels: usize) -> Decisive {
+    pub(super) fn decisive(&self) -> Decisive {
         Decisive {
-            bundle: self.bundle(pixels),
+            bundle: self.bundle(),
+            max_gaussians: self.max_gaussians,
             continuity: self.continuity,
             max_keyframes: self.max_keyframes,
             timed: self.time_budget.is_some(),

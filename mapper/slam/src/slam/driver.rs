@@ -159,8 +159,7 @@ impl SlamRun<'_> {
         let sensor = sensor(self.dataset);
         let images = keyframe_images(self.dataset, &parts.keyframes)?;
         let keyframes = keyframes(&sensor, &parts.keyframes, &images)?;
-        let pixels = sensor.camera.width * sensor.camera.height;
-        let settings = self.settings.mapping().bundle(pixels);
+        let settings = self.settings.mapping().bundle();
         let frames = state.frames.clone();
         let mut bundle = BundleAdjustment::new(SimdLevel::new(), sensor, settings, keyframes, frames);
         bundle.set_max_gaussians(parts.max_gaussians);

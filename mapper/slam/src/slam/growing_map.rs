@@ -63,8 +63,7 @@ pub(super) struct GrowingMap {
 
 impl GrowingMap {
     pub(super) fn new(sensor: Sensor, settings: &SlamSettings) -> Self {
-        let pixels = sensor.camera.width * sensor.camera.height;
-        let bundle_settings = settings.mapping().bundle(pixels);
+        let bundle_settings = settings.mapping().bundle();
         let level = SimdLevel::new();
         let bundle = BundleAdjustment::new(level, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
         let random = Pcg32::new(settings.seed, 0);

@@ -14,6 +14,7 @@ mod outside;
 mod policy;
 mod recovery;
 mod reference;
+mod relocalisation;
 mod result;
 mod session;
 mod track;

@@ -29,20 +29,8 @@ fn tiny_run() -> (TempDir, Run) {
     for (k, status) in statuses.into_iter().enumerate() {
         let timestamp = 0.5 * k as f64;
         let pose = RigidTransform::new(UnitQuaternion::identity(), Vector3::new(k as f64, 0.0, 0.0));
-        let record = FrameRecord {
-            timestamp,
-            status,
-            keyframe: u8::from(k == 0),
-            ms: 1.0,
-            blur_px: 0.0,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 1.0,
-            inliers: 1.0,
-            gain: 1.0,
-            sigma_m: None,
-            reason: None,
-        };
+        let keyframe = u8::from(k == 0);
+        let record = FrameRecord { timestamp, keyframe, ..FrameRecord::example(status) };
         writer.push(TimedExposure { timestamp, start: pose, mid: pose, end: pose }, record).unwrap();
     }
     writer.write_deblurred(0, SIZE, (0..24).collect()).unwrap();

@@ -51,6 +51,27 @@ pub struct FrameRecord {
     pub reason: Option<Reason>,
 }
 
+#[cfg(test)]
+impl FrameRecord {
+    /// A frame of some status for tests; at time 0 and no keyframe.
+    pub(crate) fn example(status: FrameStatus) -> Self {
+        Self {
+            timestamp: 0.0,
+            status,
+            keyframe: 0,
+            ms: 1.0,
+            blur_px: 0.0,
+            virtual_views: 1,
+            iterations: 1,
+            residual: 1.0,
+            inliers: 1.0,
+            gain: 1.0,
+            sigma_m: None,
+            reason: None,
+        }
+    }
+}
+
 /// Why a frame is weak or lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]

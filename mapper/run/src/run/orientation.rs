@@ -51,20 +51,7 @@ mod tests {
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::z() * std::f64::consts::FRAC_PI_2);
         let mid = RigidTransform { rotation, translation: Vector3::zeros() };
         let exposure = TimedExposure { timestamp: 0.0, start: mid, mid, end: mid };
-        let frame = FrameRecord {
-            timestamp: 0.0,
-            status: FrameStatus::Ok,
-            keyframe: 1,
-            ms: 1.0,
-            blur_px: 0.0,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 1.0,
-            inliers: 1.0,
-            gain: 1.0,
-            sigma_m: None,
-            reason: None,
-        };
+        let frame = FrameRecord { keyframe: 1, ..FrameRecord::example(FrameStatus::Ok) };
         assert!((up_direction(None, &[exposure], &[frame]) - Vector3::x()).norm() < 1e-12);
         let upright = Upright { source: UpSource::Accelerometer, sigma_degrees: Some(0.5) };
         assert_eq!(up_direction(Some(&upright), &[exposure], &[frame]), Vector3::z());

@@ -1,10 +1,7 @@
-//! From a data set to a RUN folder: tracking, mapping, both at once, and what they need around them.
+//! From a tracked run or a data set to a RUN folder with a map: mapping, and tracking and mapping at once.
 
-pub mod hindsight;
 pub mod mapping;
-pub mod self_calibration;
 pub mod slam;
-pub mod tracking;
-mod uncertainty;
 
 pub use mba_run::{export, run};
+pub use mba_tracking::{hindsight, self_calibration, tracking, uncertainty};

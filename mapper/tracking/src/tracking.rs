@@ -241,12 +241,15 @@ pub fn timed(timestamp: f64, path: &ExposureTrajectory, world_from_mid: &RigidTr
 }
 
 /// The three poses of a tracked frame.
-pub(crate) fn timed_result(result: &FrameResult) -> TimedExposure {
+pub fn timed_result(result: &FrameResult) -> TimedExposure {
     timed(result.timestamp, &result.world_from_camera, &result.world_from_mid)
 }
 
 /// A frame as the tracker takes it.
-pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
+///
+/// # Errors
+/// When an image has no pixels, or not as many values as width and height say.
+pub fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
     // Images of a data set have no padding: a row is as long as its pixels.
     let (width, height) = (image.width, image.height);
     Ok(Frame {
@@ -266,7 +269,7 @@ pub(crate) fn tracker_view(image: &RgbdFrame) -> Result<Frame<'_>, TrackError> {
 const GYRO_HALF_WINDOW: f64 = 0.006;
 
 /// Gives a frame what the data set's gyroscope, if there is one, says of the turning around it and since frame `previous`.
-pub(crate) fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Option<usize>) {
+pub fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Option<usize>) {
     let Some(imu) = dataset.imu() else { return };
     let time = frame.timestamp;
     frame.angular_velocity =
@@ -280,7 +283,7 @@ pub(crate) fn add_gyroscope(frame: &mut Frame, dataset: &Dataset, previous: Opti
 }
 
 /// What is recorded of a frame that took `ms` milliseconds.
-pub(crate) fn record(result: &FrameResult, ms: f64) -> FrameRecord {
+pub fn record(result: &FrameResult, ms: f64) -> FrameRecord {
     // Counts of the table have 32 bits.
     let count = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     FrameRecord {
@@ -313,7 +316,7 @@ fn reason(doubt: Doubt) -> Reason {
 }
 
 /// The stand-in for a frame without a result: a camera that stays where it was.
-pub(crate) fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
+pub fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
     // Nothing is known of it: every figure that does not exist is NaN.
     let pose = last.map_or_else(RigidTransform::identity, |exposure| exposure.mid);
     let exposure = TimedExposure { timestamp, start: pose, mid: pose, end: pose };

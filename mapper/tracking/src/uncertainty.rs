@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// other beyond their noise (the ratio of Birge, as in averages of measurements that do not agree). A keyframe that is turned
 /// wrongly displaces what is far from it.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub(crate) struct Uncertainty {
+pub struct Uncertainty {
     frames: Vec<Pose>,
     /// How far picture and depth contradict each other in each frame.
     disagreements: Vec<f64>,
@@ -46,25 +46,25 @@ impl Measured {
 
 impl Uncertainty {
     /// Median over the frames of how far picture and depth contradict each other: below 1 where only noise sets them apart.
-    pub(crate) fn disagreement(&self) -> f64 {
+    pub fn disagreement(&self) -> f64 {
         let mut sorted = self.disagreements.clone();
         sorted.sort_by(f64::total_cmp);
         sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
     }
 
     /// What each frame was aligned with; `given` are the frames of the recording that were taken in.
-    pub(crate) fn measured(&self, given: &[usize]) -> Vec<Measured> {
+    pub fn measured(&self, given: &[usize]) -> Vec<Measured> {
         self.frames.iter().map(|frame| frame.measured.of_recording(given)).collect()
     }
 
     /// What the last frame was aligned with.
-    pub(crate) fn last_measured(&self, given: &[usize]) -> Measured {
+    pub fn last_measured(&self, given: &[usize]) -> Measured {
         self.frames.last().map(|frame| frame.measured.of_recording(given)).unwrap_or_default()
     }
 
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
     /// relative to the first frame. None where the frame was not aligned.
-    pub(crate) fn add(&mut self, result: &FrameResult) -> Option<f64> {
+    pub fn add(&mut self, result: &FrameResult) -> Option<f64> {
         self.disagreements.push(result.disagreement);
         let place = result.world_from_mid.translation;
         let start = Pose { place: place.into(), ..Pose::default() };

@@ -1,4 +1,4 @@
-//! Files of every kind: data sets and IMU recordings, trajectories, meshes, checkpoints, and where anything may be written.
+//! Files of every kind: data sets and IMU recordings, trajectories, checkpoints, and where anything may be written.
 //!
 //! The ground floor of the mapper. `mba-mapper` re-exports what its users need.
 
@@ -8,7 +8,6 @@ pub mod dataset;
 mod error;
 pub mod file_kind;
 pub mod imu;
-pub mod mesh;
 pub mod output;
 pub mod ply;
 pub mod png;

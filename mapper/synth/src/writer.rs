@@ -7,11 +7,11 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use mba_io::mesh::{Mesh, write_mesh};
 use mba_io::output::OutputFolder;
 use mba_io::png::{encode_depth, encode_rgb};
 use mba_io::trajectory_file::{TimedExposure, TimedPose, write_exposures, write_trajectory};
 use mba_io::whole_file::{write_text, write_together};
+use mba_mesh::{Mesh, write_mesh};
 use rayon::prelude::*;
 
 use super::description::TRUTH_FOLDER;

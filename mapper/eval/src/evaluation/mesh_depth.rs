@@ -4,7 +4,7 @@ use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use mba_io::mesh::{Mesh, depth_image};
+use mba_mesh::{Mesh, depth_image};
 
 /// Why the depth of meshes cannot be compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Parts of a surface that hang together.
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 
 /// For each vertex, whether the part of the surface it belongs to has at least `least_area` square metres.
 pub(super) fn large(mesh: &Mesh, least_area: f64) -> Vec<bool> {

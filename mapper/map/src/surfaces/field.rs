@@ -1,6 +1,6 @@
 //! The surface of a signed distance that can be asked for at any point.
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 use rayon::prelude::*;
 
 use super::SurfaceError;

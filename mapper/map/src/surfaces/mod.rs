@@ -18,7 +18,7 @@ mod view;
 pub use error::SurfaceError;
 pub use field::{FieldBox, mesh_from_field};
 pub use map_views::MapViews;
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 pub use of_field::surface_of_field;
 pub use sampling::sample_surface;
 pub use sight::{Sight, Trim};

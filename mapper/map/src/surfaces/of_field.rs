@@ -1,7 +1,7 @@
 //! The surface of a tri-plane field.
 
 use mba_field::triplane::TriplaneField;
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 use mba_raster::sensor::ForwardResponse;
 use mba_tracker::photometric::InverseResponse;
 use mba_tracker::simd::Level;

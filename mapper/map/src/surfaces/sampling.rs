@@ -1,6 +1,6 @@
 //! Points evenly on a surface.
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 
 /// Steps of the two-dimensional sequence that fills a square most evenly (Roberts 2018): 1/g and 1/g^2 with
 /// g^3 = g + 1.

@@ -1,6 +1,6 @@
 //! What cameras have seen of a surface: the rest is dropped, and what was seen gets its colour.
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 use mba_raster::sensor::ForwardResponse;
 use mba_tracker::photometric::InverseResponse;
 use nalgebra::Vector3;

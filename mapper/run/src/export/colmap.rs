@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 
 use super::{PIXEL_CENTRE, PosedFrame, image_name};
 use crate::run::RunCamera;

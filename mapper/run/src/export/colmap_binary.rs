@@ -4,7 +4,7 @@
 //! All numbers are little-endian. Counts and sizes have 8 bytes, numbers of cameras and images 4, of points 8; all others are
 //! doubles but for colours and names, which end with a zero.
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 
 use super::{PIXEL_CENTRE, PosedFrame, image_name};
 use crate::run::RunCamera;

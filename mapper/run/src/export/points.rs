@@ -1,6 +1,6 @@
 //! Sparse clouds of points, from which other programs start.
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 use mba_raster::gaussians::Gaussians;
 use mba_raster::sensor::ForwardResponse;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};

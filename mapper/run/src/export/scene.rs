@@ -1,9 +1,9 @@
 //! Images with cameras and points, for programs that make a scene of them.
 
 use mba_io::dataset::{Dataset, InvalidValue};
-use mba_io::mesh::{Mesh, format_mesh};
 use mba_io::output::ExportFolder;
 use mba_io::png::{encode_depth, encode_rgb};
+use mba_mesh::{Mesh, format_mesh};
 use mba_raster::gaussians::Gaussians;
 use rayon::prelude::*;
 

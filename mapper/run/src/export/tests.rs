@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
-use mba_io::mesh::read_mesh;
 use mba_io::output::{ExportFolder, Permission};
 use mba_io::trajectory_file::TimedExposure;
+use mba_mesh::read_mesh;
 use mba_raster::gaussians::{Gaussian, Gaussians};
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{UnitQuaternion, Vector3};

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 
 use super::piece::{Crossing, Piece};
 

@@ -13,7 +13,7 @@ mod tests;
 pub use settings::FusionSettings;
 
 use blocks::{Blocks, EDGE, Place, add_places};
-use mba_io::mesh::Mesh;
+use mba_mesh::Mesh;
 use rayon::prelude::*;
 
 use super::marching::{Assembly, Lattice, Piece, SampleBox};

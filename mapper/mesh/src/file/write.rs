@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::FileError;
-use crate::mesh::Mesh;
-use crate::whole_file::write_together;
+use crate::triangles::Mesh;
+use mba_io::FileError;
+use mba_io::whole_file::write_together;
 
 /// What every mesh of this program starts with.
 const START: &str = "ply\nformat binary_little_endian 1.0\ncomment lengths in metres\n";

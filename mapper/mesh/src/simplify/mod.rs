@@ -10,7 +10,7 @@ mod surface;
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-use super::Mesh;
+use crate::triangles::Mesh;
 use surface::Surface;
 
 /// An edge that may be collapsed. The greatest is the one to take first.

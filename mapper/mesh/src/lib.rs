@@ -5,9 +5,9 @@ mod file;
 mod simplify;
 mod triangles;
 
-pub use crate::ply::PlyError;
 pub use depth_image::depth_image;
 pub use file::{
     MeshFormat, MeshTooLarge, YAxis, format_mesh, is_own_mesh, parse_mesh, read_mesh, write_mesh,
 };
+pub use mba_io::ply::PlyError;
 pub use triangles::Mesh;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use crate::mesh::Mesh;
-use crate::ply::{Element, Header, PlyError, Records};
-use crate::whole_file::read;
+use crate::triangles::Mesh;
+use mba_io::ply::{Element, Header, MAGIC, PlyError, Records};
+use mba_io::whole_file::read;
 
 /// Names of the list of a face's corners; writers disagree.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -14,7 +14,7 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 /// # Errors
 /// If the file cannot be read or is not such a file.
 pub fn read_mesh(path: &Path) -> Result<Mesh, PlyError> {
-    parse_mesh(path, &read(path, crate::ply::MAGIC)?)
+    parse_mesh(path, &read(path, MAGIC)?)
 }
 
 /// The mesh of a file with the content `bytes`; `path` only names it in errors.

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::glb::{MeshTooLarge, YAxis, format_glb, is_own_glb};
 use super::obj::{format_obj, is_own_obj};
 use super::{format_mesh, is_own_mesh};
-use crate::mesh::Mesh;
+use crate::triangles::Mesh;
 
 /// A format of meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 
 use serde_json::{Value, json};
 
-use crate::mesh::Mesh;
+use crate::triangles::Mesh;
 
 /// A mesh does not fit into its format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

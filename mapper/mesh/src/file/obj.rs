@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use crate::mesh::Mesh;
+use crate::triangles::Mesh;
 
 /// The first line.
 const TITLE: &str = "# mesh of mba, lengths in metres\n";

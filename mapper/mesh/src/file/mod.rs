@@ -16,7 +16,8 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::mesh::{Mesh, PlyError};
+    use crate::triangles::Mesh;
+    use mba_io::ply::PlyError;
 
     fn square() -> Mesh {
         Mesh {

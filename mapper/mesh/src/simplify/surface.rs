@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::quadric::Quadric;
-use crate::mesh::Mesh;
+use crate::triangles::Mesh;
 
 /// Weight of the plane that stands on a border, times the square of the edge: borders stay where they are.
 const BORDER: f64 = 4.0;

@@ -19,6 +19,7 @@ pub struct CrateTree {
     name: String,
     modules: BTreeMap<ModulePath, Module>,
     public_types: BTreeSet<String>,
+    lines: usize,
 }
 
 #[derive(Clone, Debug)]
@@ -53,11 +54,20 @@ impl CrateTree {
     /// Those of reading files; a module without a file is [`io::ErrorKind::NotFound`].
     pub fn read(name: &str, sources: &Path) -> io::Result<Self> {
         let root = if sources.join("lib.rs").is_file() { "lib.rs" } else { "main.rs" };
-        let mut tree =
-            Self { name: name.to_owned(), modules: BTreeMap::new(), public_types: BTreeSet::new() };
+        let mut tree = Self::without_modules(name);
         let read = |file: &str| std::fs::read_to_string(sources.join(file)).ok();
         tree.add(Vec::new(), root, &read)?;
         Ok(tree)
+    }
+
+    fn without_modules(name: &str) -> Self {
+        Self { name: name.to_owned(), modules: BTreeMap::new(), public_types: BTreeSet::new(), lines: 0 }
+    }
+
+    /// Lines of all files, without the tests at their ends and without files of tests.
+    #[must_use]
+    pub fn lines(&self) -> usize {
+        self.lines
     }
 
     /// Names of the public types of all files, see [`public_types`](crate::public_types).
@@ -72,8 +82,7 @@ impl CrateTree {
     /// Where a module has no file.
     #[must_use]
     pub fn from_sources(name: &str, sources: &[(&str, &str)]) -> Self {
-        let mut tree =
-            Self { name: name.to_owned(), modules: BTreeMap::new(), public_types: BTreeSet::new() };
+        let mut tree = Self::without_modules(name);
         let read =
             |file: &str| sources.iter().find(|(name, _)| *name == file).map(|(_, text)| (*text).to_owned());
         tree.add(Vec::new(), sources[0].0, &read).expect("every module has a file");
@@ -91,6 +100,8 @@ impl CrateTree {
         let missing = || io::Error::new(io::ErrorKind::NotFound, format!("{}: no file {file}", self.name));
         let source = read(file).ok_or_else(missing)?;
         self.public_types.extend(public_types(&source));
+        let product = source.split("\n#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        self.lines += product.lines().count();
         let mentions = mentions(&source);
         let children = mentions.children.clone();
         self.modules.insert(path.clone(), Module { file: file.to_owned(), mentions });

@@ -20,6 +20,16 @@ fn what_goes_one_way_has_no_cycle() {
 }
 
 #[test]
+fn lines_of_tests_are_not_counted() {
+    let sources = [
+        ("lib.rs", "mod low;\n#[cfg(test)]\nmod more_tests;\n\nfn f() {}\n"),
+        ("low.rs", "pub struct Low;\n\n#[cfg(test)]\nmod tests {\n    use super::*;\n}\n"),
+    ];
+    // Five of the first file, and one of the second: the empty line belongs to its tests.
+    assert_eq!(CrateTree::from_sources("toy", &sources).lines(), 6);
+}
+
+#[test]
 fn a_reexport_is_no_dependency_and_leads_to_the_file_behind_it() {
     // Both siblings come through mod.rs; only one needs the other.
     let sources = [

@@ -1,4 +1,5 @@
-//! The crates of this workspace have no cycles: neither between files nor between the modules of any folder.
+//! The crates of this workspace have no cycles, neither between files nor between the modules of any folder, and can be known as a
+//! whole.
 
 use std::collections::BTreeMap;
 use std::fs::read_to_string;
@@ -27,6 +28,17 @@ fn crates() -> Vec<CrateTree> {
 fn no_crate_has_a_cycle() {
     let found: String = crates().iter().flat_map(cycles).map(|cycle| cycle.to_string()).collect();
     assert!(found.is_empty(), "\n{found}");
+}
+
+/// Lines of a crate, without its tests, that someone can still know.
+const MOST_LINES: usize = 8000;
+
+#[test]
+fn no_crate_is_too_large_to_know() {
+    let lines = crates().iter().map(|tree| (tree.name().to_owned(), tree.lines())).collect::<Vec<_>>();
+    assert!(lines.iter().all(|(_, lines)| *lines > 0), "{lines:?}");
+    let too_large = lines.iter().filter(|(_, lines)| *lines > MOST_LINES).collect::<Vec<_>>();
+    assert!(too_large.is_empty(), "{too_large:?} are more than {MOST_LINES} lines");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 use clap::ValueEnum;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::output::{OutputError, OutputFolder, Permission};
-use mba_mapper::run::{RunCamera, RunSettings, Summary, stored_path};
+use mba_mapper::run::{RunSettings, Summary, stored_path};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -55,13 +55,8 @@ pub fn output_hint(error: &OutputError) -> &'static str {
 pub fn settings(dataset: &Dataset, options: &Value) -> RunSettings {
     let mut options = options.as_object().cloned().unwrap_or_default();
     options.insert("calibration".to_owned(), json!(dataset.calibration().sources));
-    RunSettings {
-        program: concat!("mba ", env!("CARGO_PKG_VERSION")).to_owned(),
-        dataset: absolute(dataset.folder()),
-        frame_rate: dataset.calibration().frame_rate,
-        camera: Some(RunCamera::from(dataset.calibration())),
-        options,
-    }
+    let settings = RunSettings::new(concat!("mba ", env!("CARGO_PKG_VERSION")), dataset);
+    RunSettings { dataset: absolute(dataset.folder()), options, ..settings }
 }
 
 /// `path` for somebody who looks at the run from another directory.

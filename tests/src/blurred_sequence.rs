@@ -148,13 +148,7 @@ impl BlurredSequence {
     /// What a run of the sequence says about itself.
     #[must_use]
     pub fn describe(&self) -> RunSettings {
-        RunSettings {
-            program: "test".to_owned(),
-            dataset: self.dataset.folder().display().to_string(),
-            frame_rate: self.dataset.calibration().frame_rate,
-            camera: Some(self.dataset.calibration().into()),
-            options: serde_json::Map::new(),
-        }
+        RunSettings::new("test", &self.dataset)
     }
 
     fn record(&self, exposure: &TimedExposure) -> FrameRecord {

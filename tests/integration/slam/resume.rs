@@ -37,13 +37,7 @@ enum Stop {
 /// A part of a run, which goes on from the part before.
 fn part(dataset: &Dataset, out: &Path, stop: Stop) -> Result<Summary, SlamError> {
     let folder = OutputFolder::for_run(out, &Default::default()).unwrap();
-    let describe = RunSettings {
-        program: "test".to_owned(),
-        dataset: dataset.folder().display().to_string(),
-        frame_rate: dataset.calibration().frame_rate,
-        camera: Some(dataset.calibration().into()),
-        options: serde_json::Map::new(),
-    };
+    let describe = RunSettings::new("test", dataset);
     let observe = |at: SlamProgress| {
         let stops = match (at, stop) {
             (SlamProgress::Frames { frames, .. }, Stop::Frame(last)) => frames >= last,

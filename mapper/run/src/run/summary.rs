@@ -1,10 +1,11 @@
 //! `summary.json`.
 
 use mba_eval::evaluation::{BlurFigures, MotionPlausibility, TrajectoryFigures};
+use mba_io::dataset::Dataset;
 use mba_io::statistics::quantile;
 use serde::{Deserialize, Serialize};
 
-use super::{FrameRecord, FrameStatus, RunCamera, Upright};
+use super::{FrameRecord, FrameStatus, RunCamera, Upright, stored_path};
 
 /// Version of the summary's layout.
 const FORMAT: u32 = 1;
@@ -23,6 +24,21 @@ pub struct RunSettings {
     pub camera: Option<RunCamera>,
     /// Options of the command by name.
     pub options: serde_json::Map<String, serde_json::Value>,
+}
+
+impl RunSettings {
+    /// Those of a run of `program` on `dataset`, without options.
+    #[must_use]
+    pub fn new(program: &str, dataset: &Dataset) -> Self {
+        let calibration = dataset.calibration();
+        Self {
+            program: program.to_owned(),
+            dataset: stored_path(dataset.folder()),
+            frame_rate: calibration.frame_rate,
+            camera: Some(calibration.into()),
+            options: serde_json::Map::new(),
+        }
+    }
 }
 
 /// Settings, counts and figures of a run.

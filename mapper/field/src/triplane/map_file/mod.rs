@@ -44,8 +44,25 @@ const MAGIC: [u8; 8] = *b"MBAFIELD";
 /// Version of the layout.
 const VERSION: u32 = 1;
 
+/// Bytes at which the numbers of the header begin, as in the table above.
+mod place {
+    pub(super) const VERSION: usize = 8;
+    pub(super) const CHECKSUM: usize = 12;
+    pub(super) const CHANNELS: usize = 16;
+    pub(super) const HIDDEN: usize = 20;
+    pub(super) const GEOMETRY_CELLS: usize = 24;
+    pub(super) const COLOUR_CELLS: usize = 28;
+    pub(super) const TRUNCATION: usize = 32;
+    pub(super) const SHARPNESS: usize = 36;
+    pub(super) const LOG_SHARPNESS: usize = 40;
+    pub(super) const SEED: usize = 44;
+    pub(super) const FIRST_CELL: usize = 52;
+    pub(super) const CELLS: usize = 64;
+    pub(super) const DECODERS: usize = 76;
+}
+
 /// First byte that the checksum covers.
-const CHECKED_FROM: usize = 16;
+const CHECKED_FROM: usize = place::CHANNELS;
 
 #[cfg(test)]
 mod tests {

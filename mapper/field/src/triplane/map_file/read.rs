@@ -6,7 +6,7 @@ use mba_io::BinaryFileError;
 use mba_io::binary_file::{check_checksum, check_length, check_version};
 use mba_io::whole_file::read;
 
-use super::{CHECKED_FROM, FieldFileError, MAGIC, VERSION};
+use super::{CHECKED_FROM, FieldFileError, MAGIC, VERSION, place};
 use crate::triplane::field::TriplaneField;
 use crate::triplane::layers::Layers;
 use crate::triplane::planes::FeaturePlanes;
@@ -14,7 +14,7 @@ use crate::triplane::region::{MOST_CELLS, Region};
 use crate::triplane::settings::{CHANNELS, FieldSettings, HIDDEN, MOST_REFINEMENT};
 
 /// Bytes before the decoders.
-const HEADER_LEN: usize = 76;
+const HEADER_LEN: usize = place::DECODERS;
 
 /// Largest logarithm of a sharpness, either way: surfaces of 1e-9 truncations, beyond single precision.
 const LARGEST_LOG_SHARPNESS: f32 = 20.0;
@@ -53,6 +53,11 @@ pub fn read_field(path: &Path) -> Result<TriplaneField, FieldFileError> {
     Ok(field)
 }
 
+/// Where the numbers of the three axes begin, of which that of x begins at `first`.
+fn axes(first: usize) -> [usize; 3] {
+    [first, first + 4, first + 8]
+}
+
 /// What the header says.
 struct Header {
     region: Region,
@@ -78,8 +83,8 @@ impl Reader<'_> {
             let (expected, found) = (HEADER_LEN as u64, bytes.len() as u64);
             return Err(BinaryFileError::Length { path: path.to_owned(), expected, found }.into());
         }
-        check_version(path, "the layout of fields", VERSION, self.u32_at(8))?;
-        Ok(check_checksum(path, self.u32_at(12), crc32fast::hash(&bytes[CHECKED_FROM..]))?)
+        check_version(path, "the layout of fields", VERSION, self.u32_at(place::VERSION))?;
+        Ok(check_checksum(path, self.u32_at(place::CHECKSUM), crc32fast::hash(&bytes[CHECKED_FROM..]))?)
     }
 
     /// The four bytes at a place inside of the header.
@@ -94,45 +99,42 @@ impl Reader<'_> {
     fn header(&self) -> Result<Header, FieldFileError> {
         self.check_header()?;
         let settings = FieldSettings {
-            geometry_cells: self.u32_at(24),
-            colour_cells: self.u32_at(28),
-            truncation: self.f32_at(32),
-            sharpness: self.f32_at(36),
+            geometry_cells: self.u32_at(place::GEOMETRY_CELLS),
+            colour_cells: self.u32_at(place::COLOUR_CELLS),
+            truncation: self.f32_at(place::TRUNCATION),
+            sharpness: self.f32_at(place::SHARPNESS),
         };
         let region = Region {
-            first: [52, 56, 60].map(|at| self.u32_at(at) as i32),
-            cells: [64, 68, 72].map(|at| self.u32_at(at)),
+            first: axes(place::FIRST_CELL).map(|at| self.u32_at(at) as i32),
+            cells: axes(place::CELLS).map(|at| self.u32_at(at)),
         };
-        let seed = u64::from(self.u32_at(44)) | (u64::from(self.u32_at(48)) << 32);
-        Ok(Header { region, settings, seed, log_sharpness: self.f32_at(40) })
+        let seed = u64::from(self.u32_at(place::SEED)) | (u64::from(self.u32_at(place::SEED + 4)) << 32);
+        Ok(Header { region, settings, seed, log_sharpness: self.f32_at(place::LOG_SHARPNESS) })
     }
 
     /// Checks that every number of the header is in its range.
     fn check_header(&self) -> Result<(), FieldFileError> {
-        self.check(16, "features per node", "8", |channels| channels == CHANNELS as u32)?;
-        self.check(20, "units per hidden layer", "16", |units| units == HIDDEN as u32)?;
+        self.check(place::CHANNELS, "features per node", "8", |channels| channels == CHANNELS as u32)?;
+        self.check(place::HIDDEN, "units per hidden layer", "16", |units| units == HIDDEN as u32)?;
         let refinement = |cells: u32| (1..=MOST_REFINEMENT).contains(&cells);
-        for at in [24, 28] {
+        for at in [place::GEOMETRY_CELLS, place::COLOUR_CELLS] {
             self.check(at, "fine cells per coarse cell", "1 to 64", refinement)?;
         }
-        for (at, name) in [(32, "truncation"), (36, "first sharpness")] {
+        for (at, name) in [(place::TRUNCATION, "truncation"), (place::SHARPNESS, "first sharpness")] {
             let value = self.f32_at(at);
             if !(value.is_finite() && value > 0.0) {
                 return Err(self.refused(name, value.to_string(), "a positive number"));
             }
         }
-        let log_sharpness = self.f32_at(40);
+        let log_sharpness = self.f32_at(place::LOG_SHARPNESS);
         if log_sharpness.is_nan() || log_sharpness.abs() > LARGEST_LOG_SHARPNESS {
             return Err(self.refused("logarithm of the sharpness", log_sharpness.to_string(), "-20 to 20"));
         }
-        for axis in 0..3 {
-            let limit = MOST_CELLS as i32;
-            self.check(52 + 4 * axis, "first cell", "-512 to 512", |cell| {
-                (cell as i32).unsigned_abs() <= limit as u32
-            })?;
-            self.check(64 + 4 * axis, "number of cells", "1 to 512", |cells| {
-                (1..=MOST_CELLS).contains(&cells)
-            })?;
+        for at in axes(place::FIRST_CELL) {
+            self.check(at, "first cell", "-512 to 512", |cell| (cell as i32).unsigned_abs() <= MOST_CELLS)?;
+        }
+        for at in axes(place::CELLS) {
+            self.check(at, "number of cells", "1 to 512", |cells| (1..=MOST_CELLS).contains(&cells))?;
         }
         Ok(())
     }
@@ -157,6 +159,7 @@ impl Reader<'_> {
         let Header { region, settings, .. } = header;
         let plane = |cells: u32| -> u64 {
             let [x, y, z] = region.cells.map(|coarse| u64::from(coarse) * u64::from(cells) + 1);
+            // Three times least value and step, four bytes each, and two bytes for each feature of a node.
             3 * 8 + (x * y + x * z + y * z) * CHANNELS as u64 * 2
         };
         let planes = 2 * plane(1) + plane(settings.geometry_cells) + plane(settings.colour_cells);

@@ -5,7 +5,7 @@ use std::path::Path;
 use mba_io::FileError;
 use mba_io::whole_file::write_durably;
 
-use super::{CHECKED_FROM, MAGIC, VERSION};
+use super::{CHECKED_FROM, MAGIC, VERSION, place};
 use crate::triplane::field::TriplaneField;
 use crate::triplane::settings::{CHANNELS, HIDDEN};
 
@@ -14,6 +14,7 @@ use crate::triplane::settings::{CHANNELS, HIDDEN};
 /// # Errors
 /// [`FileError::Unwritable`]; an older file is still there.
 pub fn write_field(path: &Path, field: &TriplaneField) -> Result<(), FileError> {
+    // Values take half of their size in memory; header and decoders fit into a page.
     let mut bytes = Vec::with_capacity(field.bytes() / 2 + 4096);
     bytes.extend(MAGIC);
     bytes.extend(VERSION.to_le_bytes());
@@ -26,7 +27,7 @@ pub fn write_field(path: &Path, field: &TriplaneField) -> Result<(), FileError> 
         planes.values.iter().for_each(|plane| quantised(&plane.0, &mut bytes));
     }
     let checksum = crc32fast::hash(&bytes[CHECKED_FROM..]);
-    bytes[12..16].copy_from_slice(&checksum.to_le_bytes());
+    bytes[place::CHECKSUM..CHECKED_FROM].copy_from_slice(&checksum.to_le_bytes());
     write_durably(path, &bytes)
 }
 

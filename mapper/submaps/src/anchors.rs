@@ -87,6 +87,7 @@ fn shared_keyframes(submaps: &[Option<Submap>]) -> Vec<Shared> {
 
 /// Information of the difference of two poses that have these.
 fn of_difference(a: &Matrix6<f64>, b: &Matrix6<f64>) -> Matrix6<f64> {
+    // The covariances of poses that were found apart add up.
     let covariances = a.try_inverse().zip(b.try_inverse());
     let information = covariances.and_then(|(a, b)| (a + b).try_inverse());
     information.map_or_else(Matrix6::zeros, |information| 0.5 * (information + information.transpose()))
@@ -123,6 +124,7 @@ fn steps(moves: &[RigidTransform], centres: &[Vector3<f64>], shared: &[Shared]) 
         .collect();
     let mut sorted = squares.clone();
     sorted.sort_by(f64::total_cmp);
+    // Places that were taken for other ones must not decide: what is odd is so relative to the typical disagreement.
     let typical = sorted.get(sorted.len() / 2).copied().unwrap_or(1.0).max(1e-12);
     let size = 6 * moves.len();
     let (mut matrix, mut descent) = (DMatrix::zeros(size, size), DVector::zeros(size));
@@ -130,22 +132,25 @@ fn steps(moves: &[RigidTransform], centres: &[Vector3<f64>], shared: &[Shared]) 
     for (((residual, poses), shared), square) in residuals.iter().zip(shared).zip(&squares) {
         let weight = 1.0 / (1.0 + square / (ODD * ODD * typical));
         let information = shared.information * weight;
+        // The residual is in the camera of the first of the two poses: the worlds move against each other there.
         let from_world = poses[0].rotation_matrix().transpose();
         let jacobians = [0, 1].map(|k| {
             let centre = moves[shared.groups[k]].transform_point(&centres[shared.groups[k]]);
             let sign = if k == 0 { -1.0 } else { 1.0 };
             sign * jacobian(&from_world, &(poses[k].translation - centre))
         });
-        for (a, by_a) in jacobians.iter().enumerate() {
+        for (a, jacobian_a) in jacobians.iter().enumerate() {
             let row = 6 * shared.groups[a];
             let mut part = descent.fixed_rows_mut::<6>(row);
-            part -= by_a.transpose() * information * residual;
-            for (b, by_b) in jacobians.iter().enumerate() {
+            // Gauss-Newton: J' W r and J' W J, a block of six for each group.
+            part -= jacobian_a.transpose() * information * residual;
+            for (b, jacobian_b) in jacobians.iter().enumerate() {
                 let mut block = matrix.fixed_view_mut::<6, 6>(row, 6 * shared.groups[b]);
-                block += by_a.transpose() * information * by_b;
+                block += jacobian_a.transpose() * information * jacobian_b;
             }
         }
     }
+    // The hold on every group keeps the matrix positive definite, so that none means numbers that are not finite.
     let solution = matrix.cholesky()?.solve(&descent);
     let finite = solution.iter().all(|step| step.is_finite());
     finite.then(|| solution.as_slice().chunks_exact(6).map(Vector6::from_column_slice).collect())

@@ -43,6 +43,7 @@ fn border(
     let elsewhere = (0..views.len()).filter(|other| !near.contains(other));
     let mut seen_again: Vec<(f64, usize)> =
         elsewhere.map(|other| (shared(other), other)).filter(|(share, _)| *share > LEAST_SHARED).collect();
+    // The most shared views first; equal ones in the order of time, so that the choice is the same everywhere.
     seen_again.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
     let mut border: Vec<usize> = near.filter(|k| !group.contains(k)).collect();
     border.extend(seen_again.into_iter().take(revisits).map(|(_, other)| other));

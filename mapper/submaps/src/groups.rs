@@ -44,6 +44,7 @@ pub(crate) fn cut(
     for k in 0..poses.len() {
         let count = k - start;
         let has_left = || views[start].shared_with(&views[k], camera) < LEAST_SHARED;
+        // What a camera that turned or went so far sees has little to do with what it saw first.
         let is_far = path > LONGEST_PATH * depth || turn > LONGEST_TURN;
         if count >= limits.most || (count >= limits.least && (is_far || has_left())) {
             groups.push(start..k);

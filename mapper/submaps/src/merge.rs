@@ -62,12 +62,14 @@ pub fn merge(
     let submaps = read_all(job, settings)?;
     let anchors = Anchors::new(&submaps);
     let factors = log_factors(&submaps);
+    // Who sees a Gaussian best owns it, so that a surface on a border is there once.
     let witnesses = witnesses(job, &submaps, &anchors.moves);
     let mut furthest = vec![None; witnesses.len()];
     let (mut map, mut all) = (Gaussians::default(), 0);
     for (k, _) in submaps.iter().enumerate().filter(|(_, submap)| submap.is_some()) {
         let group = read_ply(&job.group_folder(k).join(MAP_FILE))?;
         all += group.len();
+        // One group is in memory at a time.
         let group = in_one_world(&group, &anchors.moves[k], factors[k]);
         for gaussian in kept(job, dataset, (k, &group), &witnesses, &mut furthest) {
             map.push(&gaussian);

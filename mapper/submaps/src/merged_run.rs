@@ -38,6 +38,7 @@ impl MergedRun<'_> {
         for k in 0..self.submaps.len() {
             self.push_group(k, &mut writer, &mut figures)?;
         }
+        // All poses are known: an earlier run may go before large files are written.
         writer.replace_earlier()?;
         writer.write_map(map)?;
         let keyframes: Vec<usize> = writer.keyframes().into_iter().map(|(index, _)| index).collect();
@@ -71,6 +72,7 @@ impl MergedRun<'_> {
         writer: &mut RunWriter,
         figures: &mut MapFigures,
     ) -> Result<(), SubmapError> {
+        // Only frames that the group owns: those on its border come from their owners.
         let frames = self.job.plan.groups[k].frames();
         if self.submaps[k].is_none() {
             writer.warn(format!("group {k} is not mapped: frames {frames:?} are as they were tracked"));
@@ -85,6 +87,7 @@ impl MergedRun<'_> {
         if group.exposures.len() != self.job.plan.frames || group.frames.len() != self.job.plan.frames {
             return Err(SubmapError::Damaged { path: folder });
         }
+        // The light of the group's map was multiplied by a factor; the gain of a frame takes it back.
         let gain = (-self.factors[k]).exp();
         for index in frames {
             let record = FrameRecord { gain: group.frames[index].gain * gain, ..group.frames[index] };
@@ -93,6 +96,7 @@ impl MergedRun<'_> {
         if let Some(map) = group.summary.map {
             figures.iterations += map.iterations;
             figures.seconds += map.seconds;
+            // Mean over the groups that are mapped.
             figures.loss += map.loss / self.submaps.iter().flatten().count() as f64;
             figures.peak_memory_bytes = figures.peak_memory_bytes.max(map.peak_memory_bytes);
         }

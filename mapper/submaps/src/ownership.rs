@@ -47,6 +47,7 @@ impl Ownership {
     pub(crate) fn see(&mut self, view: &DepthView, owner: usize) {
         self.places.par_iter_mut().for_each(|place| {
             let Some(distance) = view.distance(&place.mean) else { return };
+            // The nearest and least oblique view knows most of a surface: pixels on it grow with distance over cosine.
             let cosine = view.direction(&place.mean).dot(&place.normal).abs().max(FLATTEST);
             let score = distance / cosine;
             if place.best.is_none_or(|(best, _)| score < best) {

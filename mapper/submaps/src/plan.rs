@@ -107,6 +107,7 @@ impl Plan {
         if self.frames == 0 || self.frames > MOST_FRAMES {
             return Err(format!("frames is {}, expected 1 to {MOST_FRAMES}", self.frames));
         }
+        // Groups follow each other without gaps and overlaps.
         let mut next = 0;
         for (k, group) in self.groups.iter().enumerate() {
             if group.first_frame != next || group.end_frame <= next || group.end_frame > self.frames {
@@ -122,6 +123,7 @@ impl Plan {
                     "group {k}: max_gaussians is {count}, expected at most {MOST_GAUSSIANS}"
                 ));
             }
+            // Lists are searched by bisection, so that they have to ascend.
             let [own, border] = [&group.keyframes, &group.border];
             let is_ascending = |list: &[usize]| list.windows(2).all(|pair| pair[0] < pair[1]);
             let is_own = own.iter().all(|index| group.frames().contains(index));

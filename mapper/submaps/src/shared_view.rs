@@ -44,6 +44,7 @@ impl CoarseView {
                 let depth = median_depth(frame, [left, right], [top, bottom]) / depth_scale;
                 view.depth.push(depth);
                 if depth > 0.0 {
+                    // The middle of the cell, with pixel centres at whole numbers.
                     let [u, v] = [left + right, top + bottom].map(|sum| 0.5 * (sum as f64 - 1.0));
                     view.points.push(camera.ray(u, v) * depth);
                     view.furthest = view.furthest.max(depth);
@@ -56,6 +57,7 @@ impl CoarseView {
     /// Share (0 to 1) of what this view sees that the other one sees, too.
     pub(crate) fn shared_with(&self, other: &Self, camera: &PinholeCamera) -> f64 {
         let apart = (self.world_from_camera.translation - other.world_from_camera.translation).norm();
+        // Neither sees as far: no need to look.
         if self.points.is_empty() || apart > 2.0 * (self.furthest + other.furthest) {
             return 0.0;
         }

@@ -51,12 +51,14 @@ pub fn split_run(
 ) -> Result<Job, SubmapError> {
     let camera = dataset.calibration().camera;
     let depth = survey(dataset, SAMPLED_FRAMES).median_depth.unwrap_or(SOME_DEPTH);
+    // A metre of shift at the typical depth, and a radian of turn, move the picture by so many pixels.
     let motion_px = settings.keyframe_motion * camera.width as f64;
     let keyframes = choose_keyframes(&run.exposures, &run.frames, motion_px, [camera.fx / depth, camera.fx]);
     let (keyframes, views) = views(dataset, run, &keyframes, &camera);
     if keyframes.is_empty() {
         return Err(SubmapError::NoKeyframes);
     }
+    // Groups and what they see at their borders; indices count keyframes that can be read.
     let poses: Vec<RigidTransform> = keyframes.iter().map(|&index| run.exposures[index].mid).collect();
     let ranges = cut(&poses, &views, &camera, depth, settings.limits);
     let borders = borders(&ranges, &views, &camera, settings.limits.most);
@@ -64,11 +66,14 @@ pub fn split_run(
         let seen: Vec<&CoarseView> =
             range.clone().chain(border.iter().copied()).map(|at| &views[at]).collect();
         let pixels = camera.width * camera.height;
+        // Room for what all of its views show once, however often they show it; never less than for one view.
         let by_extent = (extent(&seen, &camera) * pixels as f64) as usize / PIXELS_PER_GAUSSIAN.0;
         settings.max_gaussians.unwrap_or(by_extent.max(pixels / PIXELS_PER_GAUSSIAN.1).max(2000))
     };
+    // A group ends where the next one's first keyframe is.
     let starts: Vec<usize> = ranges.iter().map(|range| keyframes[range.start]).collect();
     let group = |(k, (range, border)): (usize, (std::ops::Range<usize>, Vec<usize>))| Group {
+        // Every frame has an owner: those before the first keyframe too.
         first_frame: if k == 0 { 0 } else { starts[k] },
         end_frame: starts.get(k + 1).copied().unwrap_or(run.exposures.len()),
         max_gaussians: gaussians(&range, &border),

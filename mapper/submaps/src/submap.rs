@@ -65,6 +65,7 @@ impl SubmapKeyframe {
     fn is_sound(&self) -> bool {
         let length = self.pose[3..].iter().map(|q| q * q).sum::<f64>();
         let numbers = self.pose.iter().chain(self.information.iter().flatten());
+        // A quaternion has length 1 to the digits that are written.
         (length - 1.0).abs() < 1e-3 && self.log_gain.is_finite() && numbers.into_iter().all(|x| x.is_finite())
     }
 }

@@ -107,9 +107,11 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
         .map_err(|error| ImportError::damaged(path, format!("metadata: {error}")))?;
     let camera = camera(&metadata);
     check_camera(&camera).map_err(|invalid| ImportError::damaged(path, format!("metadata: {invalid}")))?;
+    // Older files do not say the size of depth, which is then that of colour.
     let depth_size = (metadata.dw.unwrap_or(metadata.w), metadata.dh.unwrap_or(metadata.h));
     let all = metadata.frame_timestamps.len().max(metadata.poses.len());
     let mut beyond = 0;
+    // Frames are numbered without gaps; the first that is missing is the end.
     for index in 0.. {
         let Some(jpeg) = part(&format!("rgbd/{index}.jpg"))? else { break };
         let depth_name = format!("rgbd/{index}.depth");
@@ -120,6 +122,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
             time(&metadata, index, destination).ok_or_else(|| damaged("its time is none".to_owned()))?;
         destination.add_colour(time, &Picture::Encoded(jpeg), path)?;
         let bytes = decompress(&depth, depth_size, 4).map_err(damaged)?;
+        // Depth is metres in single precision.
         let (quads, _) = bytes.as_chunks::<4>();
         let metres = quads.iter().map(|quad| f32::from_le_bytes(*quad));
         let (file, far) = metres_png(depth_size, metres).map_err(|error| damaged(error.to_string()))?;
@@ -142,6 +145,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
 }
 
 fn camera(metadata: &Metadata) -> PinholeCamera {
+    // Column by column: the second row begins at the second number.
     let [fx, _, _, _, fy, _, cx, cy, _] = metadata.matrix;
     PinholeCamera { width: metadata.w, height: metadata.h, fx, fy, cx, cy }
 }

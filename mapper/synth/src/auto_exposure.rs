@@ -42,6 +42,7 @@ pub(super) fn exposures(
         .into_par_iter()
         .map(|index| config.gain * brightness(scene, camera, &pose(index)))
         .collect();
+    // The mean of all frames is to look as bright as usual; each frame is then brighter or darker than that.
     let wanted = USUAL * of_scene.iter().sum::<f64>() / of_scene.len() as f64;
     let interval = 1.0 / config.frame_rate;
     let [shortest, longest] = RANGE.map(|share| (share * config.exposure_seconds).min(interval));

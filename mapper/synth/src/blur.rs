@@ -42,6 +42,7 @@ pub(super) fn measure(
     for cell in 0..grid[0] * grid[1] {
         let along =
             |index: usize, count: usize, size: usize| (index as f64 + 0.5) / count as f64 * size as f64 - 0.5;
+        // The middle of a cell of the grid, on the surface that mid exposure shows there.
         let pixel = Vector2::new(
             along(cell % grid[0], grid[0], camera.width),
             along(cell / grid[0], grid[1], camera.height),

@@ -84,6 +84,7 @@ pub(super) fn response_table(response: &ResponseCurve) -> Option<(&'static str, 
 pub(super) fn readme(sequence: &SynthSequence, summary: &SynthSummary) -> String {
     let SynthConfig { scene, frames, width, height, frame_rate, seed, gain, .. } = sequence.config();
     let config = sequence.config();
+    // Words for what the settings are numbers of.
     let noise = match config.noise {
         Some(noise) => format!("{} e- full well, {} e- read noise", noise.full_well, noise.read_noise),
         None => "none".to_owned(),

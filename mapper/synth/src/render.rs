@@ -167,6 +167,7 @@ pub(super) fn depth(scene: &Scene, size: Size, view: &View) -> Vec<DepthSample> 
         let mut visible = Vec::new();
         for left in (0..size.width).step_by(TILE) {
             let block = Block { left, top: band * TILE, width: TILE, height: TILE };
+            // What no ray of the block can meet is left out for all of its pixels.
             cull_block(scene, view, &block, &mut visible);
             let right = size.width.min(left + TILE);
             for (row, samples) in samples.chunks_mut(size.width).enumerate() {

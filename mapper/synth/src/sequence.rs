@@ -87,6 +87,7 @@ impl SynthSequence {
         };
         let camera = config.camera();
         let path = CameraPath::new(steady(&config, &scene), config.seed);
+        // Exposures follow from what the path shows, and the blur from both: the path is scaled until all of it fits.
         let exposures_along = |path: &CameraPath| auto_exposure::exposures(&config, &scene, &camera, path);
         let poses_along = |path: &CameraPath| {
             let of_frame = |(index, exposure)| timing::exposure_poses(&config, path, index, exposure, 0.0);

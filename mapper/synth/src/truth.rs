@@ -18,6 +18,7 @@ pub(super) fn write(sequence: &SynthSequence, folder: &Path) -> Result<(), Synth
          what is stored (0 to 1) for linear light (0 to 1); calibration.toml: all of it as it would be on record\n",
         config.sensor.readout_seconds, config.sensor.depth_readout_seconds
     );
+    // What a program should find lies in a folder that none reads.
     let mut texts = vec![
         ("README.md", readme),
         ("exposures.csv", description::exposures(sequence)),

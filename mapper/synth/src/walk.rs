@@ -49,6 +49,7 @@ impl Walk {
     pub(super) fn pose(&self, time: f64) -> RigidTransform {
         let steps = ((time - self.begin) / STEP_SECONDS).max(0.0) + 1.0;
         let (before, t) = (steps.floor() as usize - 1, steps.fract());
+        // Basis of the uniform cubic B-spline.
         let weights = [
             (1.0 - t).powi(3) / 6.0,
             (3.0 * t.powi(3) - 6.0 * t * t + 4.0) / 6.0,
@@ -61,6 +62,7 @@ impl Walk {
             place += point.place * weight;
             yaw += point.yaw * weight;
         }
+        // Up and down once in eleven steps.
         let pitch = PITCH.0 + PITCH.1 * (TAU * steps / 11.0).sin();
         RigidTransform::new(upright_camera(yaw, pitch), place)
     }

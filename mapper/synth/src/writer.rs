@@ -148,6 +148,7 @@ fn texts(
     if config.sensor.imu {
         texts.push(("imu.csv", inertial::table(sequence)));
     }
+    // A sensor that is not on record tells its geometry and its rate only.
     if config.sensor.is_on_record {
         texts
             .extend(config.sensor.auto_exposure.then(|| ("exposures.csv", description::exposures(sequence))));

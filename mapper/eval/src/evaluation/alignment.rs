@@ -111,6 +111,7 @@ pub fn align(
     let pairs =
         || reference.iter().map(|x| x - reference_mean).zip(estimate.iter().map(|y| y - estimate_mean));
     let covariance = pairs().map(|(x, y)| x * y.transpose()).sum::<Matrix3<f64>>() / count;
+    // Umeyama: the rotation from the covariance of both, then the scale that goes with it.
     let (rotation, scaled_trace) = nearest_rotation(&covariance)?;
     let scale = match alignment {
         TrajectoryAlignment::Sim3 => {

@@ -47,6 +47,7 @@ pub fn motion_plausibility(
     let mut found = MotionPlausibility::default();
     for k in (1..exposures.len().saturating_sub(1)).filter(|k| (k - 1..=k + 1).all(&is_found)) {
         let within = length(&motion_of(&exposures[k]));
+        // A shutter is open for a part of the time between two frames: more motion within it than between them is impossible.
         let outside = between(k - 1, k).max(between(k, k + 1));
         found.judged += 1;
         found.impossible += usize::from(within > outside + MARGIN_PX);
@@ -55,6 +56,7 @@ pub fn motion_plausibility(
         let [a, b] = [k - 1, k].map(|k| motion_of(&exposures[k]));
         if length(&a) > BLURRED_PX && length(&b) > BLURRED_PX {
             let product = |a, b| motion_product(a, b, median_depth);
+            // The angle between two motions, turns weighted as what they move at the median depth.
             let cosine = product(&a, &b) / (product(&a, &a) * product(&b, &b)).sqrt();
             found.pairs += 1;
             found.reversing += usize::from(cosine < BACKWARDS);

@@ -47,6 +47,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
         };
         let time = Time::from_seconds(line.number(number, EXPECTED)? / FRAME_RATE)
             .ok_or_else(|| line.malformed(EXPECTED))?;
+        // Some lists name colour first, others depth.
         let is_depth = |name: &str| name.trim_start_matches("./").starts_with("depth");
         let (depth, colour) = if is_depth(first) { (first, second) } else { (second, first) };
         let (colour, depth) = (folder.join(colour), folder.join(depth));
@@ -57,6 +58,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
     if let Some(path) = truth(folder) {
         read_truth(&path, destination)?;
     }
+    // 5000 units per metre; rendered, so that all rows are of one moment.
     let mut facts = Facts::new(CAMERA, 5000.0);
     facts.frame_rate = Some(FRAME_RATE);
     facts.readout = Some(Shutter::Global);

@@ -58,6 +58,7 @@ fn frame(
     destination: &mut Destination,
 ) -> Result<(), ImportError> {
     let name = colour.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    // `frame-000123.color.png` lies beside `frame-000123.depth.png` and `frame-000123.pose.txt`.
     let stem = name.split('.').next().unwrap_or_default().to_owned();
     let number = stem.strip_prefix("frame-").and_then(|number| number.parse::<u32>().ok());
     let (Some(number), depth) = (number, colour.with_file_name(format!("{stem}.depth.png"))) else {
@@ -129,9 +130,11 @@ fn bundle_fusion(path: &Path) -> Result<Facts, ImportError> {
         let side = |side: &str| {
             Ok::<_, ImportError>(get(&format!("m_{}{side}", kind.to_lowercase()), 1)?[0] as usize)
         };
+        // Rows of a 4 x 4 matrix.
         let [fx, cx, fy, cy] = [matrix[0], matrix[2], matrix[5], matrix[6]];
         Ok(PinholeCamera { width: side("Width")?, height: side("Height")?, fx, fy, cx, cy })
     };
+    // Depth that was brought to the view of colour already has the same camera.
     let (colour, depth) = (camera("Color")?, camera("Depth")?);
     let mut facts = Facts::new(colour, get("m_depthShift", 1)?[0]);
     if depth != colour {

@@ -62,10 +62,12 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
         destination.exposures.extend(exposure_duration.map(|seconds| (time, seconds)));
         let world_from_camera = camera_pose.and_then(|rows| pose::from_rows(&rows));
         destination.poses.extend(world_from_camera.map(|pose| (time, pose::from_opengl(&pose))));
+        // The files do not say the size; the images have it.
         let (width, height) = destination.colour_size().unwrap_or_default();
         let [fx, _, cx, _, fy, cy, ..] = intrinsics;
         cameras.push(PinholeCamera { width, height, fx, fy, cx, cy });
         Ok(())
     })?;
+    // Autofocus changes the camera a little from frame to frame. Depth is millimetres.
     Ok(Facts::new(camera::median(cameras, destination, folder)?, 1000.0).telephone())
 }

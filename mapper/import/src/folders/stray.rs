@@ -51,6 +51,7 @@ fn read(reading: &Reading<'_>, destination: &mut Destination) -> Result<Facts, I
         }
         destination.poses.extend(row.world_from_camera.map(|pose| (row.time, pose)));
         let (width, height) = destination.colour_size().unwrap_or_default();
+        // Newer recordings have the camera of every frame, older ones one for all.
         let [fx, fy, cx, cy] = row.intrinsics.unwrap_or(shared);
         cameras.push(PinholeCamera { width, height, fx, fy, cx, cy });
         Ok(())

@@ -34,6 +34,7 @@ impl<'a> Header<'a> {
         while let Some((length, after)) = rest.split_at_checked(4) {
             let length = u32::from_le_bytes(length.try_into().ok()?) as usize;
             let (field, next) = after.split_at_checked(length)?;
+            // A field is its name, the first equals sign, and any bytes.
             let equals = field.iter().position(|byte| *byte == b'=')?;
             if &field[..equals] == name.as_bytes() {
                 return Some(&field[equals + 1..]);
@@ -164,12 +165,14 @@ fn walk(
                 unpack(&fields, &mut data, &mut chunk).map_err(|reason| stream.damaged(reason))?;
                 walk_chunk(&chunk, &mut connections, &stream, is_wanted, handle)?;
             }
+            // Indices help whoever looks for something, and all is read here.
             Some(_) => stream.skip(length)?,
             None => return Err(stream.damaged("a record does not say what it is")),
         }
         let (bytes, at) = stream.place();
         progress(at, bytes);
     }
+    // A bag that was not closed announces nothing, and is read as far as it goes.
     if index != 0 && chunks < announced {
         return Err(stream.damaged(format!("it is cut off: it has {chunks} of {announced} chunks")));
     }

@@ -145,6 +145,7 @@ fn topics(path: &Path) -> Result<Vec<Topic>, ImportError> {
         }
     }
     if channels.topics.is_empty() {
+        // Without a summary: through the whole file, for its topics only.
         let none_wanted = |_: &Topic| false;
         channels = walk(path, &none_wanted, &mut |_| Ok(()), &|_, _| ())?;
     }
@@ -159,6 +160,7 @@ fn summary_start(stream: &mut Stream) -> Result<Option<u64>, ImportError> {
     }
     stream.go_to(bytes - END)?;
     let (kind, length, start) = (stream.array::<1>()?[0], stream.u64()?, stream.u64()?);
+    // Behind the start of the summary: that of its own index, and a checksum.
     stream.skip(8 + 4)?;
     let is_footer = kind == FOOTER && length == 20 && stream.array::<8>()? == MAGIC;
     Ok(Some(start).filter(|start| is_footer && *start != 0))

@@ -95,6 +95,7 @@ fn rows(image: &Image<'_>, bytes_per_pixel: usize) -> Result<Vec<u8>, String> {
     if width == 0 || height == 0 || width.saturating_mul(height) > MOST_PIXELS {
         return Err(format!("an image claims to have {width} x {height} pixels"));
     }
+    // The last row needs no filling.
     let row = width * bytes_per_pixel;
     let needed = image.step.checked_mul(height - 1).and_then(|bytes| bytes.checked_add(row));
     if image.step < row || needed.is_none_or(|needed| needed > image.data.len()) {

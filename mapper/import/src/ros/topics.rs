@@ -56,6 +56,7 @@ impl Chosen {
     pub(super) fn among(topics: &[Topic], options: &ImportOptions) -> Result<Self, String> {
         let colour = find(topics, options.colour_topic.as_deref(), "colour", colour_rank)?;
         let near =
+            // A depth topic of the right kind comes first; of two, the one whose name begins as that of colour does.
             |topic: &Topic| depth_rank(topic).map(|rank| 100 * rank + common(&topic.name, &colour.name));
         let depth = find(topics, options.depth_topic.as_deref(), "depth", near)?;
         let is_image = |topic: &Topic| topic.message_type == IMAGE;
@@ -66,6 +67,7 @@ impl Chosen {
         let mut add =
             |topic: Option<&Topic>, role: Role| roles.extend(topic.cloned().map(|topic| (topic, role)));
         let of_type = |name: &'static str| move |topic: &Topic| topic.message_type == name;
+        // Cameras, then what wrappers of cameras say of each image and of depth.
         add(companion(topics, colour, of_type(CAMERA_INFO)), Role::ColourCamera);
         add(companion(topics, depth, of_type(CAMERA_INFO)), Role::DepthCamera);
         let metadata = |topic: &Topic| {
@@ -82,6 +84,7 @@ impl Chosen {
             add(place_of(topics, topic), Role::StreamPlace(Stream::Imu));
             add(Some(topic), role);
         }
+        // Where streams are relative to each other, as numbers or in the tree of frames.
         add(place_of(topics, colour), Role::StreamPlace(Stream::Colour));
         add(place_of(topics, depth), Role::StreamPlace(Stream::Depth));
         for topic in topics {

@@ -294,6 +294,7 @@ impl Calibration {
                 "seconds to add to depth's timestamps, -0.2 to 0.2",
             ));
         }
+        // One says how wrong timestamps are, the other what to have instead of them.
         if clock != 0.0 && self.depth_delay_seconds.is_some() {
             let expected = "0 or nothing beside depth_delay_seconds, which replaces the timestamps";
             return Err(invalid("depth_clock_seconds", clock, expected));

@@ -122,6 +122,7 @@ impl MovedView {
             let (u, v) = ((index % size.0) as f64, (index / size.0) as f64);
             let metres = f64::from(*raw) / self.depth_scale;
             let point = |u: f64, v: f64| self.moved(u, v, metres);
+            // Corners of the depth pixel in the picture: what lies between them is covered, so that nothing shows through.
             let (Some(first), Some(last)) =
                 (self.pixel(point(u - 0.5, v - 0.5)), self.pixel(point(u + 0.5, v + 0.5)))
             else {

@@ -60,6 +60,7 @@ fn read_curve(file: &TextFile, path: &Path) -> Result<InverseResponse, FileError
     let mut last_line = 1;
     for line in file.lines().skip(1) {
         let [light, value] = line.numbers(EXPECTED)?;
+        // A curve that is flat or falls cannot be turned round.
         let continues = match samples.last() {
             None => light == 0.0 && value == 0.0,
             Some(before) => light > before[0] && value > before[1] && light <= 1.0 && value <= 1.0,

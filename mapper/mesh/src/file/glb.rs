@@ -78,6 +78,7 @@ pub(super) fn is_own_glb(start: &[u8]) -> bool {
 fn describe(mesh: &Mesh, counts: [usize; 3], lengths: [usize; 3], y_axis: YAxis) -> Value {
     let (low, high) = bounds(mesh);
     let mut attributes = json!({"POSITION": 0});
+    // Component types: 5126 single precision, 5125 `u32`, 5123 `u16`. Targets: 34962 vertices, 34963 indices.
     let mut accessors = vec![
         json!({"bufferView": 0, "componentType": 5126, "count": counts[0],
             "type": "VEC3", "min": low, "max": high}),
@@ -96,6 +97,7 @@ fn describe(mesh: &Mesh, counts: [usize; 3], lengths: [usize; 3], y_axis: YAxis)
     }
     let mut node = json!({"mesh": 0});
     if y_axis == YAxis::Down {
+        // Half a turn about x.
         node["rotation"] = json!([1, 0, 0, 0]);
     }
     let data: usize = lengths.iter().sum();

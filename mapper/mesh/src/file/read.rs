@@ -79,6 +79,7 @@ fn read_faces(
             return Err(PlyError::NoSuchVertex { path: path.to_owned(), face, found, vertices });
         }
         if let [first, rest @ ..] = corners.as_slice() {
+            // A face with n corners is n - 2 triangles about its first.
             let fan = rest.windows(2).map(|pair| [*first, pair[0], pair[1]]);
             mesh.triangles.extend(fan.map(|corners| corners.map(|corner| corner as u32)));
         }

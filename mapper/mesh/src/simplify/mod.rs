@@ -63,6 +63,7 @@ impl Mesh {
         while surface.left() > triangles {
             let Some(next) = candidates.pop() else { break };
             let [a, b] = next.edge;
+            // Its cost was that of an edge that has changed; the new one is in the heap, too.
             if next.changes != [a, b].map(|end| changes[end as usize]) {
                 continue;
             }

@@ -111,6 +111,7 @@ impl<'a> SceneExport<'a> {
                 names.extend([POINTS_FILE, TRANSFORMS_FILE].map(str::to_owned));
             }
             SceneLayout::Colmap => {
+                // As text, which people read, and in binary, which training programs read first.
                 names.extend([POINTS3D_FILE, IMAGES_FILE, CAMERAS_FILE].map(str::to_owned));
                 names.extend(
                     [BINARY_POINTS3D_FILE, BINARY_IMAGES_FILE, BINARY_CAMERAS_FILE].map(str::to_owned),

@@ -165,6 +165,7 @@ pub(super) fn read_frames(path: &Path) -> Result<Vec<FrameRecord>, RunError> {
 }
 
 fn malformed(path: &Path, error: &csv::Error) -> RunError {
+    // What the reader has no place for is wrong in the first line: a column is missing.
     let line = error.position().map_or(1, csv::Position::line);
     let message = match error.kind() {
         csv::ErrorKind::Deserialize { err, .. } => match err.field().and_then(|f| COLUMNS.get(f as usize)) {

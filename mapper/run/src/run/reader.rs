@@ -35,6 +35,7 @@ impl Run {
         let json = read_text(&path)?;
         let malformed = |message| RunError::MalformedSummary { path: path.clone(), message };
         let summary: Summary = serde_json::from_str(&json).map_err(|error| malformed(error.to_string()))?;
+        // Commands divide by focal lengths and allocate by sizes.
         if let Some(camera) = &summary.settings.camera {
             camera.check().map_err(|error| malformed(format!("camera: {error}")))?;
         }

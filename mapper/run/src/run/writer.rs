@@ -63,6 +63,7 @@ impl RunWriter {
             warnings: Vec::new(),
             unwritten: 0,
         };
+        // An earlier run stays as it is until this one has proven itself.
         if !has_earlier {
             writer.start()?;
         }
@@ -209,6 +210,7 @@ impl RunWriter {
     /// As [`Self::create`], and for a map of a kind that has no file.
     pub fn write_map<'a>(&self, map: impl Into<Scene<'a>>) -> Result<(), RunError> {
         let other = match map.into() {
+            // A folder has a map of one kind only, so that nobody reads the wrong one.
             Scene::Gaussians(map) => {
                 write_ply(&self.folder().join(MAP_FILE), map).map_err(RunError::from_write)?;
                 FIELD_FILE

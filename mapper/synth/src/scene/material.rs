@@ -78,11 +78,13 @@ pub(super) enum Material {
 impl Material {
     /// The same kind of look with other colours and prints; number 0 is the look itself.
     pub(super) fn varied(self, number: u32) -> Self {
+        // Channels change places: another hue.
         let dye = |colour: Vec3| match number % 3 {
             0 => colour,
             1 => Vec3::new(colour.y, colour.z, colour.x),
             _ => Vec3::new(colour.z, colour.x, colour.y),
         };
+        // Further apart than the seeds of one room.
         let seed = |seed: u32| seed + 1000 * number;
         match self {
             Self::Plaster { colour, stain } => Self::Plaster { colour: dye(colour), stain },

@@ -104,21 +104,26 @@ pub(super) fn colour(rgb: u32) -> Vec3 {
 /// gaps between words, ragged right ends of paragraphs.
 pub(super) fn text(p: Vec2, letter: f32, pixel: f32, seed: u32) -> f32 {
     let dot = letter / 5.0;
+    // Lines are 1.7 letters apart; a letter is three dots wide, and one more is between letters.
     let (line, in_line) = split(Vec2::new(0.0, -p.y / (1.7 * letter)));
     let (column, in_letter) = split(Vec2::new(p.x / (4.0 * dot), 0.0));
     let letter_cell = IVec2::new(column.x, line.y);
+    // One letter in six is a gap, and one of eight stretches of nine letters is the ragged end of a paragraph.
     let word_gap = random(letter_cell, seed ^ 0x51) < 0.17;
     let paragraph_end = random(IVec2::new(column.x / 9, line.y), seed ^ 0x77) < 0.12;
     if word_gap || paragraph_end {
         return 0.0;
     }
+    // Five rows of dots, then the space between lines.
     let row = in_line.y * 1.7 * 5.0;
     let dot_column = in_letter.x * 4.0;
     if row >= 5.0 || dot_column >= 3.0 {
         return 0.0;
     }
+    // Each letter has fifteen random dots.
     let bit = row as u32 * 3 + dot_column as u32;
     let ink = (hash(letter_cell, seed) >> (bit + 8)) & 1;
+    // Dots that are smaller than a pixel are half ink, half paper.
     let sharpness = visibility(1.5 * dot, pixel);
     0.5 + (ink as f32 - 0.5) * sharpness
 }

@@ -46,6 +46,7 @@ fn is_in_the_way(thing: &Thing) -> bool {
 fn wall(x: f32, number: u32) -> Vec<Thing> {
     let paper = Material::Wallpaper { base: colour(0xcdd8cf), figure: colour(0x5f8f86) }.varied(number + 1);
     let ([from, to], height) = DOOR;
+    // Beside the door on both sides, and above it. Pictures of 24 mm lie on the wall.
     let part = |low: f32, high: f32, bottom: f32, top: f32| {
         Thing::cuboid(x, bottom, 0.5 * (low + high), [WALL, top - bottom, high - low], 0.0, paper)
     };

@@ -43,6 +43,7 @@ pub(super) fn track_backwards(
         if observe().is_break() {
             return Err(TrackingError::Stopped);
         }
+        // As on the way forwards, a frame that cannot be read or tracked is passed over.
         let Ok(image) = dataset.frame(index) else { continue };
         let Ok(frame) = tracker_view(&image) else { continue };
         let frame = reversed(frame, dataset, given.last().copied(), expected[index].as_ref());
@@ -51,7 +52,9 @@ pub(super) fn track_backwards(
         uncertainty.add(&result);
         let measured = uncertainty.last_measured(&given);
         let exposure = timed_result(&result);
+        // What closes the shutter when time runs backwards opens it.
         let (start, end) = (exposure.end, exposure.start);
+        // The frame that came before, with what this one tells of it; its own record stays.
         if let Some(revision) = &result.revision {
             let revised: &mut Option<SeenBackwards> = &mut seen[given[revision.index]];
             if let Some(revised) = revised {
@@ -92,6 +95,7 @@ fn reversed<'a>(
 ) -> Frame<'a> {
     add_gyroscope(&mut frame, dataset, previous);
     Frame {
+        // Time turns its sign, and with it whatever has an odd power of it: rates and jerks, not accelerations.
         timestamp: -frame.timestamp,
         depth_timestamp: -frame.depth_timestamp,
         angular_velocity: frame.angular_velocity.map(|rate| -rate),

@@ -14,6 +14,7 @@ pub(super) fn relative_brightness(tracked: &[Tracked], frames: usize) -> Vec<f64
     let mut known: Vec<Option<f64>> = vec![None; frames];
     let mut last = 1.0;
     for frame in tracked {
+        // A gain is relative to the frame that it was measured against, whose brightness is known by then.
         let chained =
             known[frame.reference].filter(|_| frame.is_found).map(|reference| reference * frame.gain);
         let step = |value: &f64| (1.0 / MAX_STEP..=MAX_STEP).contains(&(value / last));
@@ -23,6 +24,7 @@ pub(super) fn relative_brightness(tracked: &[Tracked], frames: usize) -> Vec<f64
         }
         known[frame.index] = Some(last);
     }
+    // Frames that were not tracked get the brightness before them.
     let mut before = 1.0;
     let filled: Vec<f64> = known
         .into_iter()
@@ -35,6 +37,7 @@ pub(super) fn relative_brightness(tracked: &[Tracked], frames: usize) -> Vec<f64
     if most / least < CONSTANT {
         return vec![1.0; frames];
     }
+    // Relative to the geometric mean, so that exposures vary around the one that is sought.
     let mean = filled.iter().map(|value| value.ln()).sum::<f64>() / frames as f64;
     filled.iter().map(|value| value / mean.exp()).collect()
 }

@@ -175,6 +175,7 @@ impl Estimates {
     }
 
     fn apply(&self, dataset: Dataset) -> Result<Dataset, DatasetError> {
+        // Each estimate takes its place, and its source says that it is one.
         let mut calibration = dataset.calibration().clone();
         let exposure_known = is_exposure_known(&calibration);
         if let Some(found) = self.readout {
@@ -193,6 +194,7 @@ impl Estimates {
             calibration.vignetting = found.vignetting;
             calibration.sources.vignetting = Knowledge::Estimated;
         }
+        // Nothing moves enough to blur, so that the shortest exposure does as well as any.
         if !exposure_known && self.exposures == Exposures::NoMotion {
             calibration.exposure = ExposureSource::Assumed { seconds: SHORTEST };
         }
@@ -232,6 +234,7 @@ impl Estimates {
                 return unknown("too little motion to tell; every frame is taken for sharp".into());
             }
         };
+        // One figure for the table; the note has the range.
         let middle = median(seconds).unwrap_or(SHORTEST);
         let (least, most) = seconds.iter().fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
         let note = if least == most {

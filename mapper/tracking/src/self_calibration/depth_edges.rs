@@ -235,6 +235,7 @@ pub(super) fn gradient(image: &RgbdFrame) -> Vec<u8> {
         let (along_u, along_v) = (green(at + 1) - green(at - 1), green(at + width) - green(at - width));
         along_u.hypot(along_v).min(STRONGEST)
     };
+    // Central differences of green, which most pixels of a sensor measure; then 1 2 1 along rows and columns.
     let magnitude: Vec<f32> = (0..width * height).map(strength).collect();
     let smoothed = |values: &[f32], step: usize| {
         let mut out = vec![0.0; values.len()];

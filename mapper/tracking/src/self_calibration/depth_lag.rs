@@ -64,6 +64,7 @@ pub fn depth_lag(dataset: &Dataset) -> Option<DepthLag> {
     if is_known || dataset.len() < FEWEST_FRAMES + 2 {
         return None;
     }
+    // The first and the last frame have no neighbour on one side.
     let inner = dataset.len() - 2;
     let count = inner.min(SAMPLES);
     let indices: Vec<usize> = (0..count).map(|k| 1 + k * inner / count).collect();
@@ -84,6 +85,7 @@ pub fn depth_lag(dataset: &Dataset) -> Option<DepthLag> {
         let delay_seconds = if is_late { -interval } else { interval };
         DepthLag { is_late, delay_seconds, agreeing, sampled }
     };
+    // The next depth image fits better: depth is late. If both fit better, the edges say nothing.
     match [verdict(0), verdict(1)] {
         [None, Some(agreeing)] => Some(found(true, agreeing)),
         [Some(agreeing), None] => Some(found(false, agreeing)),

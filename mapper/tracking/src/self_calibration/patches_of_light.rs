@@ -110,6 +110,7 @@ impl Patches {
             if !(self.is_plain[patch] && light > DARK && depth > 0.0) {
                 return None;
             }
+            // The middle of the patch, put into space by its depth and seen from the other frame.
             let [u, v] = self.middle(patch);
             let point: Vector3<f64> = other_from_own.transform_point(&(camera.ray(u, v) * f64::from(depth)));
             if point.z < NEAREST {
@@ -117,6 +118,7 @@ impl Patches {
             }
             let seen = camera.project(&point);
             let [other_light, other_depth] = other.sample([seen.x, seen.y])?;
+            // Something else is in front of it there, or it is in front of what was there.
             let is_hidden = (other_depth - point.z as f32).abs() > SAME_SURFACE * other_depth;
             (!is_hidden && other_light > DARK).then(|| Shared {
                 log_ratio: f64::from(light).ln() - f64::from(other_light).ln(),

@@ -45,6 +45,7 @@ impl ReadoutSearch<'_> {
     /// The readout with which rows and poses agree; none where they agree with a global shutter, or with anything.
     pub(super) fn find(&self) -> Option<Measured> {
         let interval = 1.0 / self.window.recording.dataset.calibration().frame_rate;
+        // The shortest share downwards and upwards tells the direction of the rows.
         let ends = [interval, -interval].map(|longest| SHARES[0] * longest);
         let factors: Vec<Option<Spread>> = ends.into_par_iter().map(|readout| self.factor(readout)).collect();
         let (down, up) = (factors[0]?, factors[1]?);
@@ -62,6 +63,7 @@ impl ReadoutSearch<'_> {
         if !is_told {
             return None;
         }
+        // The factor falls through 1 where the readout is right: two more readouts enclose it.
         let [_, middle, longest] = SHARES.map(|share| sign * share * interval);
         let shares = crossing(first, self.factor(longest)?, || self.factor(middle))?;
         Some(Measured { seconds: sign * shares.seconds * interval, sigma: shares.sigma * interval })
@@ -99,6 +101,7 @@ fn crossing(shortest: Spread, longest: Spread, middle: impl FnOnce() -> Option<S
     } else {
         (middle, longest, second, last - second)
     };
+    // Linear between the two that enclose it.
     let slope = (before.median - after.median) / length;
     let share = start + (before.median - 1.0) / slope;
     let sigma = (before.sigma.max(after.sigma) / slope).hypot(SYSTEMATIC * share);

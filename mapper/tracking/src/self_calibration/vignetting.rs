@@ -128,6 +128,7 @@ fn pairs(window: &Window<'_>, tracked: &[Tracked]) -> Vec<Vec<Sample>> {
             Some(Patches::of(image, &response, calibration.depth_scale))
         })
         .collect();
+    // Each frame with later ones at several distances.
     let couples: Vec<[usize; 2]> = (0..tracked.len())
         .flat_map(|first| APART.map(|apart| [first, first + apart]))
         .filter(|[_, second]| *second < tracked.len())
@@ -161,6 +162,7 @@ fn fit(pairs: &[Vec<Sample>]) -> Option<FallOff> {
             return None;
         }
     }
+    // In the corners r is 1, so that a2 and a4 count alike.
     let corner = Vector2::repeat(1.0);
     let independent = (corner.dot(&(covariance * corner))).max(0.0).sqrt();
     let missing = 1.0 - vignetting.falloff(1.0);

@@ -65,6 +65,7 @@ impl<'a> Fusion<'a> {
     fn update(&self, [z, y, x]: &Place, block: &mut Block) {
         let first = Vector3::new(*x, *y, *z).cast::<f32>() * (self.voxel * EDGE as f32);
         let first = self.rotation * first + self.translation;
+        // Steps of one voxel along the axes of the world, seen by the camera.
         let [dx, dy, dz] = [0, 1, 2].map(|axis| self.rotation.column(axis) * self.voxel);
         if self.is_out_of_sight(&(first + (dx + dy + dz) * (0.5 * (EDGE - 1) as f32))) {
             return;

@@ -45,6 +45,7 @@ fn samples(blocks: &Blocks, place: &Place) -> SampleBox {
     const POINTS: usize = EDGE + 1;
     let mut values = vec![f32::NAN; POINTS * POINTS * POINTS];
     for neighbour in 0..8 {
+        // Bits say whether the neighbour is one further along each axis: of it the first voxels are needed, of the block all.
         let upper = [neighbour >> 2 & 1, neighbour >> 1 & 1, neighbour & 1];
         let at: Place = std::array::from_fn(|axis| place[axis].saturating_add(upper[axis]));
         let Some(block) = blocks.get(&at) else { continue };

@@ -80,6 +80,7 @@ pub(super) fn fault(imu: &ImuRecording, tracked: &[Tracked]) -> Option<Gyroscope
     if as_read.len() < FEWEST_PAIRS || typical < LEAST_TURNING {
         return None;
     }
+    // What is missed by the readings as they are, for comparison.
     let unrepaired = Reading::weighted(&as_read, |_, _| Some((Rotation3::identity(), 1.0)))?;
     let steps = (LONGEST_LAG / LAG_STEP) as i32;
     let candidates = (-steps..=steps).filter_map(|step| {
@@ -141,6 +142,7 @@ impl Reading {
             let means = [mean(0), mean(1)];
             let deviations: Vec<Pair> =
                 pairs.iter().map(|pair| [pair[0] - means[0], pair[1] - means[1]]).collect();
+            // About the means: a bias of the gyroscope adds the same to all readings.
             let (mut product, mut power) = (Matrix3::zeros(), 0.0);
             for ([camera, read], weight) in deviations.iter().zip(&weights) {
                 product += camera * read.transpose() * *weight;
@@ -151,6 +153,7 @@ impl Reading {
                 deviations.iter().map(|[camera, read]| (camera - rotation * read * factor).norm()).collect();
             let residual = median(&missed)?;
             let usual = residual.max(f64::MIN_POSITIVE);
+            // Huber's weights for the next round.
             weights = missed.iter().map(|missed| (HUBER * usual / missed.max(usual)).min(1.0)).collect();
             reading = Some(Self { rotation, factor, residual });
         }

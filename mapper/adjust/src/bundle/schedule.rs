@@ -147,7 +147,8 @@ impl Schedule {
     #[must_use]
     pub fn field(keyframes: usize) -> Self {
         let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
-        // As for Gaussians; a step is a few thousand pixels, so there are three times as many.
+        // As for Gaussians; a step is a few thousand pixels, so there are three times as many. A view costs samples along
+        // every ray: fewer of them, farther apart.
         let coarse = Stage { steps: visits(15, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 5 };
         let fine = Stage { steps: visits(60, 1200), time_share: 0.6, level: 0, spacing: 5.0, max_views: 9 };
         let last = Stage { steps: visits(25, 500), time_share: 0.3, level: 0, spacing: 4.0, max_views: 15 };
@@ -170,6 +171,7 @@ impl Schedule {
     pub fn growing(visits: u32) -> StepPlan {
         let paths = if visits < SETTLED { 0.0 } else { 1.0 };
         StepPlan {
+            // Half resolution and views 4 pixels apart, as for the details later: there is time for few steps per frame.
             level: 1,
             spacing: 4.0,
             max_views: 9,

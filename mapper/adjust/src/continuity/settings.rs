@@ -43,14 +43,21 @@ pub struct ContinuitySettings {
 impl Default for ContinuitySettings {
     fn default() -> Self {
         Self {
+            // Fifty times gravity, and the turn that gives it a third of a metre from the axis; both build up within 5 ms.
             translation: MotionLimits { acceleration: 500.0, jerk: 100_000.0 },
             rotation: MotionLimits { acceleration: 1_500.0, jerk: 300_000.0 },
+            // As many as an exposure has ends.
             control_points_per_frame: 2.0,
+            // Three standard deviations: noise alone hardly ever goes beyond.
             huber: 3.0,
             jerk_tolerance: 2.0,
+            // Far beyond the tails of noise, and of what is typical of the sequence.
             outlier: 10.0,
+            // Odds of e^5, 150 to 1.
             swap_evidence: 5.0,
+            // A third of a second at 30 Hz.
             longest_gap: 10.0,
+            // An upper bound: it ends when no direction flips and turns have settled.
             rounds: 8,
         }
     }

@@ -109,6 +109,7 @@ pub(super) fn signed_unit(random: &mut Pcg32) -> f32 {
 
 /// The next number of `random`, in `[0, 1)`.
 pub(super) fn unit(random: &mut Pcg32) -> f32 {
+    // As many bits as single precision holds exactly.
     (random.next_u32() >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 

@@ -130,6 +130,7 @@ pub(super) fn sums_of_plane<S: Simd>(
 /// From the cells of a plane with `columns` nodes in a row to their nodes: a bit per node.
 pub(super) fn nodes_of_cells(bits: &mut [u64], columns: usize) {
     for shift in [columns, 1] {
+        // Words of 64 bits, from the last one down, so that each is read before it changes.
         let (words, rest) = (shift / 64, shift % 64);
         for word in (words..bits.len()).rev() {
             let from = bits[word - words];

@@ -32,6 +32,7 @@ pub struct FieldSettings {
 
 impl Default for FieldSettings {
     fn default() -> Self {
+        // Cells of 6 cm for geometry, the length of the truncation, and of 1.5 cm for colours.
         Self { geometry_cells: 4, colour_cells: 16, truncation: 0.06, sharpness: 10.0 }
     }
 }

@@ -1,7 +1,7 @@
 //! Wrong sizes and states are refused with a message, never answered with zeros.
 
 use mba_mapper::exposure::{ExposureRenderer, ExposureScratch};
-use mba_mapper::gaussians::{Gaussian, Gaussians};
+use mba_mapper::gaussians::{ForViewers, Gaussian, Gaussians, format_ply_for_viewers};
 use mba_mapper::raster::{GaussianGradients, RasterImage, RasterScratch, RasterView, Rasterizer};
 use mba_tests::raster_scene::{random_gaussians, random_view, to_parameters};
 use mba_tests::transfer_scene::Uniform;
@@ -55,7 +55,15 @@ fn an_exposure_goes_backward_only_after_it_went_forward() {
 }
 
 #[test]
-#[should_panic(expected = "index out of bounds")]
+#[should_panic(expected = "Gaussian 3 of a map of 3 Gaussians")]
 fn a_gaussian_that_is_not_there_is_not_replaced() {
     Gaussians::zeros(3).set(3, &Gaussian::default());
+}
+
+#[test]
+#[should_panic(expected = "colours and sizes of 2 Gaussians for a map of 3")]
+fn a_file_for_viewers_needs_colours_of_all_gaussians() {
+    let planes = || [0; 3].map(|_| vec![0.5; 2]);
+    let viewing = ForViewers { colours: planes(), log_scales: planes(), comments: Vec::new() };
+    let _ = format_ply_for_viewers(&Gaussians::zeros(3), &viewing);
 }

@@ -1,6 +1,11 @@
 //! What is known of a frame from the frames on both sides of it.
 
+use std::ops::ControlFlow;
+
+use mba_mapper::hindsight::look_back;
+use mba_mapper::run::RunWriter;
 use mba_mapper::synth::{SensorModel, SynthConfig};
+use mba_mapper::tracking::TrackingOptions;
 use mba_tests::blurred_sequence::BlurredSequence;
 use mba_tests::handheld::{RenderedFrame, Shake, camera_of_width, tracker_config, workspace};
 use mba_tracker::{ExpectedPath, Frame, FrameStatus, SimdLevel, Tracker};
@@ -72,6 +77,16 @@ fn both_ways_together_are_better_than_one() {
         println!("{name}: {errors:?}");
         assert!(after < 0.9 * before, "{name}: {errors:?} m");
     }
+}
+
+#[test]
+#[should_panic(expected = "what was measured belongs to another data set")]
+fn measurements_of_another_recording_are_refused() {
+    let filmed =
+        BlurredSequence::new(SynthConfig { frames: 2, width: 64, height: 48, ..SynthConfig::default() });
+    let mut run = RunWriter::create(filmed.output("run"), filmed.describe()).unwrap();
+    let go_on = || ControlFlow::Continue(());
+    let _ = look_back(&filmed.dataset, &TrackingOptions::default(), &mut run, &[], go_on);
 }
 
 #[test]

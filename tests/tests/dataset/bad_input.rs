@@ -30,6 +30,12 @@ fn a_damaged_frame_is_an_error_of_that_frame_only() {
 }
 
 #[test]
+#[should_panic(expected = "frame 3 of a data set of 3 frames")]
+fn the_time_of_a_frame_that_is_not_there_is_refused() {
+    let _ = Folder::complete().open().timestamp(3);
+}
+
+#[test]
 fn images_of_another_size_or_type_are_errors() {
     let folder = Folder::complete();
     let larger = colour_image(9, HEIGHT);

@@ -161,6 +161,12 @@ mod tests {
             .to_vec()
     }
 
+    #[test]
+    #[should_panic(expected = "points to align come in pairs")]
+    fn points_without_a_partner_are_refused() {
+        let _ = align(&points(), &points()[1..], TrajectoryAlignment::Sim3);
+    }
+
     fn known() -> Similarity {
         Similarity {
             scale: 2.5,

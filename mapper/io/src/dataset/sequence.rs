@@ -197,7 +197,7 @@ impl Dataset {
     /// If `index` is not below [`Self::len`].
     #[must_use]
     pub fn image_paths(&self, index: usize) -> [&Path; 2] {
-        let entry = &self.entries[index];
+        let entry = self.entry(index);
         [&entry.colour, &entry.depth]
     }
 
@@ -222,7 +222,7 @@ impl Dataset {
     /// If `index` is not below [`Self::len`].
     #[must_use]
     pub fn timestamp(&self, index: usize) -> f64 {
-        self.entries[index].timestamp
+        self.entry(index).timestamp
     }
 
     /// When the depth of frame `index` was measured, seconds: by the delay of the calibration, else by the depth
@@ -233,7 +233,7 @@ impl Dataset {
     /// If `index` is not below [`Self::len`].
     #[must_use]
     pub fn depth_timestamp(&self, index: usize) -> f64 {
-        self.entry_depth_timestamp(&self.entries[index])
+        self.entry_depth_timestamp(self.entry(index))
     }
 
     /// Time the shutter was open for frame `index`, seconds: recorded for the frame, else for the camera, else
@@ -244,7 +244,12 @@ impl Dataset {
     /// If `index` is not below [`Self::len`].
     #[must_use]
     pub fn exposure_seconds(&self, index: usize) -> f64 {
-        self.entry_exposure(&self.entries[index])
+        self.entry_exposure(self.entry(index))
+    }
+
+    fn entry(&self, index: usize) -> &FrameEntry {
+        let frames = self.entries.len();
+        self.entries.get(index).unwrap_or_else(|| panic!("frame {index} of a data set of {frames} frames"))
     }
 
     /// Reads, decodes and undistorts frame `index`.

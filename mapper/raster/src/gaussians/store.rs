@@ -106,6 +106,8 @@ impl Gaussians {
     /// # Panics
     /// If there are fewer.
     pub fn set(&mut self, index: usize, gaussian: &Gaussian) {
+        let count = self.len();
+        assert!(index < count, "Gaussian {index} of a map of {count} Gaussians");
         for (plane, value) in self.planes.iter_mut().zip(gaussian.to_array()) {
             plane[index] = value;
         }

@@ -73,6 +73,10 @@ pub fn format_ply(gaussians: &Gaussians) -> Vec<u8> {
 /// If there are not colours and sizes for every Gaussian.
 #[must_use]
 pub fn format_ply_for_viewers(gaussians: &Gaussians, viewing: &ForViewers) -> Vec<u8> {
+    for plane in viewing.colours.iter().chain(&viewing.log_scales) {
+        let (known, count) = (plane.len(), gaussians.len());
+        assert_eq!(known, count, "colours and sizes of {known} Gaussians for a map of {count}");
+    }
     let kept = kept(gaussians);
     let mut bytes = header(kept.len(), &MAP_NAMES, &viewing.comments);
     for (index, gaussian) in &kept {

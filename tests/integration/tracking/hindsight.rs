@@ -82,8 +82,7 @@ fn both_ways_together_are_better_than_one() {
 #[test]
 #[should_panic(expected = "what was measured belongs to another data set")]
 fn measurements_of_another_recording_are_refused() {
-    let filmed =
-        BlurredSequence::new(SynthConfig { frames: 2, width: 64, height: 48, ..SynthConfig::default() });
+    let filmed = recording(1, 0.3, SensorModel::IDEAL);
     let mut run = RunWriter::create(filmed.output("run"), filmed.describe()).unwrap();
     let go_on = || ControlFlow::Continue(());
     let _ = look_back(&filmed.dataset, &TrackingOptions::default(), &mut run, &[], go_on);

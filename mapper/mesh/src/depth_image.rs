@@ -68,6 +68,7 @@ impl InverseDepth<'_> {
                 let pixel = Vector2::new(column as f64, row as f64);
                 if let Some(weights) = barycentric(&corners, &pixel) {
                     let nearest = &mut self.pixels[row * width + column];
+                    // The largest inverse depth is the nearest.
                     *nearest = nearest.max(weights.dot(&inverse_depth));
                 }
             }

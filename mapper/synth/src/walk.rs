@@ -69,6 +69,7 @@ impl Walk {
 
     /// Rooms that a walk of so many seconds comes into or looks into.
     pub(super) fn rooms(seconds: f64) -> usize {
+        // The spline needs three points beyond its last step.
         let last = (seconds / STEP_SECONDS).ceil() as usize + 3;
         let furthest = (0..=last).map(|k| point(k).place.x).fold(0.0, f64::max);
         (furthest / ROOM).round() as usize + 2

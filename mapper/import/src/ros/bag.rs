@@ -32,6 +32,7 @@ impl<'a> Header<'a> {
     fn field(&self, name: &str) -> Option<&'a [u8]> {
         let mut rest = self.0;
         while let Some((length, after)) = rest.split_at_checked(4) {
+            // Every field comes after its own length.
             let length = u32::from_le_bytes(length.try_into().ok()?) as usize;
             let (field, next) = after.split_at_checked(length)?;
             // A field is its name, the first equals sign, and any bytes.
@@ -87,6 +88,7 @@ fn open(path: &Path) -> Result<(Stream, u64, u32), ImportError> {
     let (Some(index), Some(chunks)) = (index, header.u32("chunk_count")) else {
         return Err(stream.damaged("the header of the bag makes no sense"));
     };
+    // The header is filled up, so that it can be written again when the bag is closed.
     let padding = stream.u32()?;
     stream.skip(u64::from(padding))?;
     Ok((stream, index, chunks))

@@ -49,6 +49,7 @@ pub(super) fn format_glb(mesh: &Mesh, y_axis: YAxis) -> Result<Vec<u8>, MeshTooL
     // Chunks have whole words.
     text.resize(text.len().next_multiple_of(4), b' ');
     let total = data.saturating_add(text.len() + HEADERS[0] + 2 * HEADERS[1]);
+    // Lengths in the file have 32 bits.
     let total = u32::try_from(total).map_err(|_| MeshTooLarge { bytes: total })?;
     let mut bytes = Vec::with_capacity(total as usize);
     bytes.extend(b"glTF");
@@ -58,6 +59,7 @@ pub(super) fn format_glb(mesh: &Mesh, y_axis: YAxis) -> Result<Vec<u8>, MeshTooL
     bytes.extend((data as u32).to_le_bytes());
     bytes.extend(b"BIN\0");
     bytes.extend(mesh.vertices.as_flattened().iter().flat_map(|coordinate| coordinate.to_le_bytes()));
+    // Colours of vertices are linear light in this format.
     let linear: [u16; 256] = std::array::from_fn(|byte| linear_light(byte as u8));
     for colour in colours {
         let [r, g, b] = colour.map(|byte| linear[usize::from(byte)]);

@@ -32,6 +32,7 @@ impl Run {
         if !path.is_file() {
             return Err(RunError::NotARun { folder: folder.to_owned(), missing: SUMMARY_FILE });
         }
+        // The summary comes first: it says whether the folder is a run at all.
         let json = read_text(&path)?;
         let malformed = |message| RunError::MalformedSummary { path: path.clone(), message };
         let summary: Summary = serde_json::from_str(&json).map_err(|error| malformed(error.to_string()))?;
@@ -50,6 +51,7 @@ impl Run {
     /// Of the poses and of what was said of the frames, wherever the run lies.
     #[must_use]
     pub fn fingerprint(&self) -> Fingerprint {
+        // As text that tells all numbers apart.
         let exposures: Vec<String> = self.exposures.iter().map(|exposure| format!("{exposure:?}")).collect();
         let records: Vec<String> = self.frames.iter().map(|record| format!("{record:?}")).collect();
         Fingerprint::of(&(exposures, records))

@@ -45,7 +45,7 @@ fn stages(c: &mut Criterion) {
     keyframe.depth.fill(SimdLevel::new(), &frame.depth, config.metres_per_unit);
     c.bench_function("plane fit", |b| b.iter(|| keyframe.restart_surface(SimdLevel::new())));
     c.bench_function("keypoint selection, all levels", |b| {
-        b.iter(|| keyframe.select(0.02, config.align.dark_intensity, config.region));
+        b.iter(|| keyframe.select(SimdLevel::new(), 0.02, config.align.dark_intensity, config.region));
     });
     let next = recording.view(1, 0.0).expect("a frame");
     depth.fill(SimdLevel::new(), &next.depth, config.metres_per_unit);

@@ -73,7 +73,7 @@ pub(crate) fn align(
     let mut keyframe = Keyframe::carve(&mut arena, &camera, LEVELS, DEPTH_LEVEL).expect("memory");
     keyframe_images.fill(&mut keyframe.pyramid, &mut keyframe.depth);
     keyframe.restart_surface(SimdLevel::new());
-    keyframe.select(0.02, settings.dark_intensity, region);
+    keyframe.select(SimdLevel::new(), 0.02, settings.dark_intensity, region);
     let mut pyramid = GreyPyramid::carve(&mut arena, &camera, LEVELS).expect("memory");
     let mut depth = InverseDepthMap::carve(&mut arena, &camera, DEPTH_LEVEL).expect("memory");
     frame_images.fill(&mut pyramid, &mut depth);

@@ -97,7 +97,7 @@ impl<'m> Keyframe<'m> {
     }
 
     /// Selects the keypoints of every level within `region` of the finest, for the current image and planes.
-    pub fn select(&mut self, min_strength: f32, dark_intensity: f32, region: PixelRectangle) {
+    pub fn select(&mut self, simd: Level, min_strength: f32, dark_intensity: f32, region: PixelRectangle) {
         for (level, keypoints) in self.keypoints.iter_mut().enumerate() {
             let settings = SelectionSettings {
                 cell: CELL[level],
@@ -107,6 +107,7 @@ impl<'m> Keyframe<'m> {
             };
             // Every level has its own keypoints: what is an edge on one is noise or flat on another.
             self.counts[level] = select_keypoints(
+                simd,
                 &self.pyramid.levels[level].image(),
                 level,
                 &self.planes,

@@ -2,13 +2,14 @@
 //!
 //! # Layout
 //!
-//! Shifts are known at the nodes of a lattice, the pixels of a coarser pyramid level. Tiles are 64 columns from top to bottom:
+//! Shifts are known at the nodes of a lattice, the pixels of a coarser pyramid level. Tiles are 64 columns in strips of 64 rows:
 //! the lattice is interpolated along its rows first, once for all rows of the image between two of its own, then between
 //! them; one sample of the image per SIMD lane.
 //!
 //! # Cost
 //!
-//! Per pixel one cell (two loads of neighbouring pairs) and about thirty arithmetic operations.
+//! Per vector nine loads and about forty arithmetic operations; where neighbours are pulled apart, two loads of pairs per
+//! pixel instead.
 
 use fearless_simd::{Level, dispatch, prelude::*};
 
@@ -17,6 +18,9 @@ use crate::image::{BilinearSampler, LevelImage};
 
 /// Pixels of a tile: a multiple of every vector length.
 const TILE: usize = 64;
+
+/// Rows of a tile: few enough for the cache to hold them all across the image.
+const STRIP: usize = 64;
 
 /// Shifts at the pixels of pyramid level `level`, in pixels of the finest.
 pub(super) struct Shifts<'a> {
@@ -85,28 +89,30 @@ fn resample_tiles<S: Simd>(simd: S, image: &LevelImage, shifts: &Shifts, out: &m
     let load = |values: &[f32; TILE], k: usize| S::f32s::from_slice(simd, &values[k..k + S::f32s::LEN]);
     let empty = TileShifts { du: [0.0; TILE], dv: [0.0; TILE] };
     let mut light = [0.0; TILE];
-    for left in (0..image.width).step_by(TILE) {
-        let columns = TileColumns::new(shifts, left);
-        // The rows of the lattice above and below the row of the image; they change every few rows.
-        let (mut above, mut below, mut filled) = (empty, empty, None);
-        for (v, row) in out.chunks_exact_mut(image.width).enumerate() {
-            let (j, fv) = shifts.node(v, shifts.height);
-            if filled != Some(j) {
-                shifts.fill_row(&columns, j, &mut above);
-                shifts.fill_row(&columns, j + 1, &mut below);
-                filled = Some(j);
+    for (strip, rows) in out.chunks_mut(STRIP * image.width).enumerate() {
+        for left in (0..image.width).step_by(TILE) {
+            let columns = TileColumns::new(shifts, left);
+            // The rows of the lattice above and below the row of the image; they change every few rows.
+            let (mut above, mut below, mut filled) = (empty, empty, None);
+            for (row, v) in rows.chunks_exact_mut(image.width).zip(strip * STRIP..) {
+                let (j, fv) = shifts.node(v, shifts.height);
+                if filled != Some(j) {
+                    shifts.fill_row(&columns, j, &mut above);
+                    shifts.fill_row(&columns, j + 1, &mut below);
+                    filled = Some(j);
+                }
+                for k in (0..TILE).step_by(S::f32s::LEN) {
+                    let [du, dv] = [(&above.du, &below.du), (&above.dv, &below.dv)].map(|(above, below)| {
+                        let above = load(above, k);
+                        above + (load(below, k) - above) * fv
+                    });
+                    let u = S::f32s::from_fn(simd, |lane| (left + k + lane) as f32) + du;
+                    let (u, y) = (u.max(0.0).min(last_u), (dv + v as f32).max(0.0).min(last_v));
+                    sampler.sample_neighbours(u, y).store_slice(&mut light[k..k + S::f32s::LEN]);
+                }
+                let right = (left + TILE).min(image.width);
+                row[left..right].copy_from_slice(&light[..right - left]);
             }
-            for k in (0..TILE).step_by(S::f32s::LEN) {
-                let [du, dv] = [(&above.du, &below.du), (&above.dv, &below.dv)].map(|(above, below)| {
-                    let above = load(above, k);
-                    above + (load(below, k) - above) * fv
-                });
-                let u = S::f32s::from_fn(simd, |lane| (left + k + lane) as f32) + du;
-                let (u, y) = (u.max(0.0).min(last_u), (dv + v as f32).max(0.0).min(last_v));
-                sampler.sample(&sampler.locate(u, y)).value.store_slice(&mut light[k..k + S::f32s::LEN]);
-            }
-            let right = (left + TILE).min(image.width);
-            row[left..right].copy_from_slice(&light[..right - left]);
         }
     }
 }

@@ -1,12 +1,12 @@
 //! Keypoint selection: the strongest gradient of every grid cell whose depth is known.
 
 use bytemuck::{Pod, Zeroable};
+use fearless_simd::{Level, dispatch, f32x4, prelude::*};
 
 use crate::geometry::PinholeCamera;
 use crate::image::LevelImage;
 use crate::image::PixelRectangle;
-use crate::math::sqrt_f32;
-use crate::surface::SurfacePlanes;
+use crate::surface::{SurfacePlanes, lanes_of};
 use crate::transfer::PATTERN_RADIUS;
 
 /// A pixel of the reference image with the plane it lies on.
@@ -41,6 +41,20 @@ pub struct SelectionSettings {
 /// `planes` are the keyframe's surface planes on pyramid level `planes_level`; pixels without a plane (holes and
 /// depth edges) are never selected. `keypoints` bounds the number.
 pub fn select_keypoints(
+    simd: Level,
+    image: &LevelImage,
+    level: usize,
+    planes: &SurfacePlanes,
+    planes_level: usize,
+    settings: &SelectionSettings,
+    keypoints: &mut [Keypoint],
+) -> usize {
+    dispatch!(simd, simd => select_on(simd, image, level, planes, planes_level, settings, keypoints))
+}
+
+#[inline(always)]
+fn select_on<S: Simd>(
+    simd: S,
     image: &LevelImage,
     level: usize,
     planes: &SurfacePlanes,
@@ -59,7 +73,8 @@ pub fn select_keypoints(
             }
             let last_v = (cell_v + cell).min(region.bottom);
             let last_u = (cell_u + cell).min(region.right);
-            let Some((u, v, strength)) = strongest(image, cell_u..last_u, cell_v..last_v, settings) else {
+            let Some((u, v, strength)) = strongest(simd, image, cell_u..last_u, cell_v..last_v, settings)
+            else {
                 continue;
             };
             let at = |x: usize| PinholeCamera::pixel_at_level(x as f32, level, planes_level);
@@ -80,11 +95,13 @@ pub fn typical_inverse_depth(keypoints: &[Keypoint]) -> f64 {
     keypoints.get(keypoints.len() / 2).map_or(0.5, |keypoint| f64::from(keypoint.inverse_depth))
 }
 
-/// Pixels whose gradients are computed at once, so that the compiler makes vectors of them.
+/// Pixels whose gradients are computed at once.
 const RUN: usize = 8;
 
 /// The pixel of a cell with the largest whitened gradient, if it is strong enough.
-fn strongest(
+#[inline(always)]
+fn strongest<S: Simd>(
+    simd: S,
     image: &LevelImage,
     columns: core::ops::Range<usize>,
     rows: core::ops::Range<usize>,
@@ -94,38 +111,29 @@ fn strongest(
     let mut best = None;
     let mut best_squared = settings.min_strength * settings.min_strength;
     for v in rows {
-        // The pixels of the cell's row, and their neighbours.
-        let around =
-            |row: usize, shift: usize| &image.pixels[row * w + columns.start + shift - 1..][..columns.len()];
-        let (centre, left, right) = (around(v, 1), around(v, 0), around(v, 2));
-        let (above, below) = (around(v - 1, 1), around(v + 1, 1));
-        let squared = |k: usize| {
-            let (gu, gv) = (0.5 * (right[k] - left[k]), 0.5 * (below[k] - above[k]));
-            // Photon noise grows with the light: gradients are compared in units of it.
-            (gu * gu + gv * gv) / (centre[k] + settings.dark_intensity)
-        };
+        // The rest of the image from the cell's row on, and from the neighbours of its first pixel.
+        let from = |row: usize, shift: usize| &image.pixels[row * w + columns.start + shift - 1..];
+        let (centre, left, right) = (from(v, 1), from(v, 0), from(v, 2));
+        let (above, below) = (from(v - 1, 1), from(v + 1, 1));
         for first in (0..columns.len()).step_by(RUN) {
-            let run = first..(first + RUN).min(columns.len());
-            if run.len() < RUN {
-                for k in run {
-                    let strength = squared(k);
-                    if strength > best_squared {
-                        (best_squared, best) = (strength, Some((columns.start + k, v)));
-                    }
-                }
-                continue;
-            }
+            let of = |row: &[f32]| lanes_of(simd, row, first);
+            let (gu, gv) = ((of(right) - of(left)) * 0.5, (of(below) - of(above)) * 0.5);
+            // Photon noise grows with the light: gradients are compared in units of it.
+            let strengths = (gu * gu + gv * gv) / (of(centre) + settings.dark_intensity);
+            let in_cell = &strengths.as_slice()[..RUN.min(columns.len() - first)];
             // Few runs have a stronger pixel than those before: which one it is, is looked up only then.
-            let strengths: [f32; RUN] = core::array::from_fn(|k| squared(first + k));
-            let largest = strengths.iter().fold(0.0f32, |a, &b| if b > a { b } else { a });
-            if largest > best_squared
-                && let Some(k) = strengths.iter().position(|&strength| strength == largest)
-            {
-                (best_squared, best) = (largest, Some((columns.start + first + k, v)));
+            if strengths.simd_gt(best_squared).any_true() {
+                let largest = in_cell.iter().fold(best_squared, |a, &b| if b > a { b } else { a });
+                if largest > best_squared
+                    && let Some(k) = in_cell.iter().position(|&strength| strength == largest)
+                {
+                    (best_squared, best) = (largest, Some((columns.start + first + k, v)));
+                }
             }
         }
     }
-    best.map(|(u, v)| (u, v, sqrt_f32(best_squared)))
+    // In a vector, as everything here.
+    best.map(|(u, v)| (u, v, f32x4::splat(simd, best_squared).sqrt()[0]))
 }
 
 #[cfg(test)]
@@ -159,7 +167,7 @@ mod tests {
             SurfacePlanes { value: &mut value, slope_u: &mut slope_u, slope_v: &mut slope_v, width, height };
         let image = LevelImage { pixels: image, width: SIZE.0, height: SIZE.1 };
         let mut keypoints = vec![Keypoint::default(); capacity];
-        let count = select_keypoints(&image, 0, &planes, 1, &SETTINGS, &mut keypoints);
+        let count = select_keypoints(Level::new(), &image, 0, &planes, 1, &SETTINGS, &mut keypoints);
         keypoints.truncate(count);
         keypoints
     }

@@ -201,7 +201,7 @@ impl Tracker<'_> {
     }
 
     pub(super) fn select_keypoints(&mut self) {
-        self.keyframe.select(MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
+        self.keyframe.select(self.simd, MIN_STRENGTH, self.config.align.dark_intensity, self.config.region);
     }
 
     /// Remembers the coarse part of the keyframe for recovery before it is replaced.

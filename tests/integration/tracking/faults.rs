@@ -1,9 +1,10 @@
 //! Camera faults in the middle of a sequence: no panic, the right status, and no trace afterwards.
 
-use mba_tests::handheld::{RenderedFrame, camera_of_width, pose_error, track_anew, tracker_config};
+use mba_tests::handheld::{RenderedFrame, Shake, camera_of_width, pose_error, track_anew, tracker_config};
+use mba_tests::plane_scene::PlaneScene;
 use mba_tracker::{Doubt, FrameResult, FrameStatus};
 
-use crate::scenes::{SMALL, elsewhere};
+use crate::scenes::{EXPOSURE, SMALL, elsewhere};
 
 /// Replaces frame 6 of the small sequence and tracks it all.
 fn with_fault(fault: impl Fn(&RenderedFrame) -> RenderedFrame) -> Vec<FrameResult> {
@@ -79,6 +80,31 @@ fn dropped_frames_are_bridged() {
             assert!(result.status != FrameStatus::Lost && metres < 0.003, "gap {gap}: {metres} m");
         }
     }
+}
+
+/// Every tenth frame of a hand that turns and moves far: hardly any shares much with the one before.
+fn thinned_out(seed: u64) -> Vec<RenderedFrame> {
+    let hand = Shake { metres: 0.4, radians: 0.5, hertz: 1.1 };
+    let (scene, camera) = (PlaneScene::corner(seed, 0.16), camera_of_width(160));
+    let times = (0..8).map(|k| f64::from(k) / 3.0 + 0.1 * seed as f64);
+    times.map(|t| RenderedFrame::new(&scene, &camera, t, EXPOSURE, hand.exposure(t, EXPOSURE))).collect()
+}
+
+#[test]
+fn where_frames_share_little_hardly_a_wrong_one_is_ok() {
+    let (mut ok, mut wrong) = (0, 0);
+    for seed in 1..=12 {
+        let frames = thinned_out(seed);
+        let results = track_anew(&tracker_config(camera_of_width(160)), &frames);
+        for (result, frame) in results.iter().zip(&frames).skip(1) {
+            let (metres, _) = pose_error(result, frame, &frames[0]);
+            println!("seed {seed}, frame {}: {:?}, {metres:.4} m", result.index, result.status);
+            ok += usize::from(result.status == FrameStatus::Ok);
+            wrong += usize::from(result.status == FrameStatus::Ok && metres > 0.05);
+        }
+    }
+    println!("{wrong} of {ok} frames that are ok are wrong");
+    assert!(ok > 3 && wrong <= 2, "{wrong} of {ok}");
 }
 
 #[test]

@@ -4,7 +4,9 @@ use fearless_simd::Level;
 use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 use super::damping::Damping;
-use super::measure::{NOMINAL_PHOTON_VARIANCE, measure_depth, measure_photometric, nominal_model};
+use super::measure::{
+    NOMINAL_PHOTON_VARIANCE, measure_contrast, measure_depth, measure_photometric, nominal_model,
+};
 use super::objective::Linearised;
 use super::placement::{blur_length, place_sites};
 use super::prior::MotionPrior;
@@ -47,6 +49,8 @@ pub struct LevelOutcome {
     pub views: usize,
     /// Robust standard deviation of the photometric residual relative to the nominal noise model.
     pub photometric_scale: f32,
+    /// Median contrast of the frame within the patches that took part, in the same unit; 0 on other levels than the finest.
+    pub contrast: f32,
     /// Robust standard deviation of the depth residual, 1/m; 0 without depth term.
     pub depth_scale: f32,
     /// Patches that took part.
@@ -74,6 +78,7 @@ impl LevelOutcome {
             work: Work::default(),
             views: 1,
             photometric_scale: 0.0,
+            contrast: 0.0,
             depth_scale: 0.0,
             patches: 0,
             patches_in_view: 0,
@@ -212,6 +217,9 @@ impl Alignment<'_> {
         // Both scales are over the noise of a good image.
         outcome.photometric_scale = sqrt_f32(objective.model.photon_variance / NOMINAL_PHOTON_VARIANCE);
         outcome.depth_scale = objective.depth.as_ref().map_or(0.0, |depth| depth.sigma);
+        if plan.level == 0 {
+            outcome.contrast = measure_contrast(&objective, &scratch.sites[..kept], scratch.medians);
+        }
         (objective, kept)
     }
 }

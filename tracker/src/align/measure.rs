@@ -4,7 +4,10 @@ use super::depth_term::{DepthProblem, gate_for, noise_of};
 use super::problem::{AlignScratch, DepthPart, Objective};
 use super::scale::median;
 use super::{AlignSettings, Estimate};
-use crate::transfer::{self, PatchCost, ResidualModel, RowBand};
+use crate::math::sqrt_f32;
+use crate::transfer::{
+    self, PATCH_PIXELS, PATTERN_DU, PATTERN_DV, PatchCost, PatchSite, ResidualModel, RowBand,
+};
 
 /// Nominal variance per unit of light; the measured scale multiplies it.
 pub(super) const NOMINAL_PHOTON_VARIANCE: f32 = 1e-4;
@@ -60,6 +63,28 @@ const MIN_COST: f32 = 1e-3;
 
 fn mean_cost(patch: &PatchCost) -> f32 {
     if patch.pixels > 0.0 { patch.cost / patch.pixels } else { f32::MAX }
+}
+
+/// Median over the sites of the standard deviation of the frame's light within a patch, in nominal standard deviations of
+/// the noise: the residual of a patch that is compared with nothing but its own mean. `medians` is scratch.
+pub(super) fn measure_contrast(objective: &Objective, sites: &[PatchSite], medians: &mut [f32]) -> f32 {
+    let image = &objective.frame.levels[objective.level];
+    let mut count = 0;
+    for site in sites {
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for (du, dv) in PATTERN_DU.iter().zip(&PATTERN_DV) {
+            let (column, row) = (i32::from(site.u) + du, i32::from(site.v) + dv);
+            let light = image.pixels[row as usize * image.width + column as usize];
+            sum += light;
+            squares += light * light;
+        }
+        let mean = sum / PATCH_PIXELS as f32;
+        // Rounding may take the variance of a flat patch below zero.
+        let variance = (squares / PATCH_PIXELS as f32 - mean * mean).max(0.0);
+        medians[count] = variance / (mean + objective.settings.dark_intensity).max(f32::MIN_POSITIVE);
+        count += 1;
+    }
+    sqrt_f32(median(&mut medians[..count]) / NOMINAL_PHOTON_VARIANCE)
 }
 
 /// Measures the depth noise scale at `estimate`; `None` where too few points overlap. `medians` is scratch.

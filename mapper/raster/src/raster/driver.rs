@@ -1,5 +1,6 @@
 //! The stages in order, each over all threads of the current pool.
 
+use core::cell::Cell;
 use core::ops::Range;
 
 use mba_tracker::simd::Level;
@@ -23,6 +24,12 @@ use crate::gaussians::{Gaussians, PARAMETERS};
 /// Gaussians per piece of work of the projection and its backward pass.
 const GAUSSIANS_PER_PIECE: usize = 512;
 
+thread_local! {
+    /// Memory for what a view projects, which is needed only until it is sorted: of every thread, not of every view, since it
+    /// has room for all Gaussians, however few of them a view shows.
+    static PROJECTED: Cell<Vec<Projected>> = const { Cell::new(Vec::new()) };
+}
+
 /// Renders Gaussians and takes gradients back to them.
 #[derive(Clone, Copy, Debug)]
 pub struct Rasterizer {
@@ -37,6 +44,7 @@ pub struct RasterScratch {
     /// Columns and rows of the image, of which the view may have a band only.
     size: [usize; 2],
     pub(super) background: [f32; 3],
+    /// Between the first stage and the second.
     projected: Vec<Projected>,
     order: Order,
     pub(super) bins: Bins,
@@ -91,7 +99,9 @@ impl RasterScratch {
     /// Whether Gaussians, an image and gradients have the sizes of the last view.
     pub fn fits(&self, gaussians: &Gaussians, image: &RasterImage, gradients: &GaussianGradients) -> bool {
         let same_image = [image.width, image.height] == self.size;
-        same_image && gaussians.len() == self.projected.len() && gradients.screen.len() == gaussians.len()
+        same_image
+            && gaussians.len() == self.order.rank_from_gaussian.len()
+            && gradients.screen.len() == gaussians.len()
     }
 
     fn splat_gradients<'a>(&'a self, planes: &'a [&'a [f32]; PARAMETERS]) -> SplatGradients<'a> {
@@ -166,8 +176,11 @@ impl Rasterizer {
         geometry: bool,
         scratch: &mut RasterScratch,
     ) {
+        // While this view waits for its parts, the thread may begin another, which finds nothing here and makes its own.
+        scratch.projected = PROJECTED.take();
         self.project_grid(gaussians, view, grid, scratch);
         self.order(scratch);
+        PROJECTED.set(core::mem::take(&mut scratch.projected));
         self.bin_grid(grid, scratch);
         if geometry {
             self.composite_tiles::<true>(scratch);
@@ -426,5 +439,53 @@ impl PoseSums {
             rotation: Matrix3::from_fn(|i, j| total[4 * i + j]),
             translation: Vector3::from_fn(|i, _| total[4 * i + 3]),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::gaussians::Gaussian;
+    use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+
+    #[test]
+    fn a_view_keeps_four_bytes_of_a_gaussian_that_it_does_not_show() {
+        let ball = |x: f32| Gaussian {
+            mean: [x, 0.0, 2.0],
+            log_scale: [-3.0; 3],
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            opacity_logit: 3.0,
+            ..Gaussian::default()
+        };
+        // One in front of the camera, all others far to the right.
+        let gaussians: Gaussians = (0..5000).map(|k| ball(if k == 7 { 0.0 } else { 50.0 })).collect();
+        let camera = PinholeCamera { width: 32, height: 24, fx: 30.0, fy: 30.0, cx: 15.5, cy: 11.5 };
+        let view = |x: f64| RasterView {
+            camera,
+            world_from_camera: RigidTransform {
+                translation: Vector3::new(x, 0.0, 0.0),
+                ..RigidTransform::identity()
+            },
+            background: [0.0; 3],
+        };
+        let (rasterizer, mut image) = (Rasterizer::new(Level::new()), RasterImage::default());
+        let mut scratch = [RasterScratch::default(), RasterScratch::default()];
+        for (scratch, x) in scratch.iter_mut().zip([0.0, 0.1]) {
+            rasterizer.forward(&gaussians, &view(x), scratch, &mut image);
+            assert_eq!((scratch.drawn(), scratch.is_drawn(7), scratch.is_drawn(8)), (1, true, false));
+            let order = &scratch.order;
+            let kept = [scratch.projected.capacity(), order.splats.capacity(), order.extents.capacity()];
+            assert!(kept.iter().sum::<usize>() < 100, "{kept:?}");
+            assert_eq!(order.rank_from_gaussian.len(), gaussians.len());
+        }
+        // Gradients find both views as they were rendered.
+        let mut gradients = GaussianGradients::zeros(gaussians.len());
+        image.colour[0].fill(1.0);
+        scratch.iter_mut().for_each(|scratch| {
+            rasterizer.backward(&gaussians, &image, scratch, &mut gradients);
+        });
+        assert_ne!(gradients.parameters.get(7), gradients.parameters.get(8));
     }
 }

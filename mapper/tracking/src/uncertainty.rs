@@ -47,9 +47,7 @@ impl Measured {
 impl Uncertainty {
     /// Median over the frames of how far picture and depth contradict each other: below 1 where only noise sets them apart.
     pub fn disagreement(&self) -> f64 {
-        let mut sorted = self.disagreements.clone();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+        median(&self.disagreements)
     }
 
     /// What each frame was aligned with; `given` are the frames of the recording that were taken in.
@@ -86,6 +84,13 @@ impl Uncertainty {
         let is_first = self.frames.len() == 1;
         (own.is_some() || is_first).then(|| pose.position.sqrt()).filter(|sigma| sigma.is_finite())
     }
+}
+
+/// The middle value, the upper one of two; 0 without values.
+pub(crate) fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Variances of position, square metres, and rotation, square radians, of a frame relative to what it was aligned with, all axes

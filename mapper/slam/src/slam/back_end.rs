@@ -18,8 +18,10 @@ use super::messages::{Instruction, MapperLink, SharpView, Skipped, TrackedFrame}
 use super::progress::SlamProgress;
 use super::saved::{Counts, Keeper, MapperParts, Replay, SavedKeyframe};
 use super::settings::{Arrival, SlamReference, SlamSettings};
+use super::tracker_state::TrackerState;
 use crate::mapping::sensor;
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
+use crate::uncertainty::median;
 
 /// Time after which the folder is brought up to date: a run that is killed loses no more.
 const FLUSH_EVERY: Duration = Duration::from_secs(2);
@@ -44,6 +46,10 @@ pub(super) struct BackEnd {
     on_map: bool,
     /// Frames since that was decided.
     undisputed: usize,
+    /// How far picture and depth contradict each other, of each frame that was tracked.
+    disagreements: Vec<f64>,
+    /// What the tracker knew after the newest frame, in lock step.
+    tracker: TrackerState,
     /// For checkpoints, in lock step.
     keeper: Option<Keeper>,
 }
@@ -64,17 +70,19 @@ impl BackEnd {
             figures: SlamFigures::default(),
             on_map: false,
             undisputed: 0,
+            disagreements: Vec::new(),
+            tracker: TrackerState::default(),
             keeper,
         }
     }
 
-    /// Takes over what a run that was stopped knew; returns what its tracker has to go through again.
+    /// Takes over what a run that was stopped knew; returns what its tracker goes on from.
     pub(super) fn restore(
         &mut self,
         dataset: &Dataset,
         parts: MapperParts,
         state: BundleState,
-    ) -> Result<Replay, SlamError> {
+    ) -> Result<Option<Replay>, SlamError> {
         let images = keyframe_images(dataset, &parts.keyframes)?;
         let keyframes = keyframes(&self.map.sensor, &parts.keyframes, &images)?;
         let sensor = self.map.sensor.clone();
@@ -85,10 +93,11 @@ impl BackEnd {
         let Counts { frames_on_map, late_frames, relocalisations } = parts.counts;
         self.figures = SlamFigures { frames_on_map, late_frames, relocalisations, ..self.figures };
         (self.on_map, self.undisputed) = (parts.on_map, parts.undisputed);
-        if let Some(keeper) = &mut self.keeper {
+        self.disagreements = parts.disagreements;
+        let replay = self.keeper.as_mut().map(|keeper| {
             keeper.go_on(parts.seconds, parts.instructions.clone());
-        }
-        let replay = Replay::new(parts.rows.len(), parts.instructions);
+            Replay::new((parts.rows.len(), parts.tracker), parts.instructions, keeper.path().to_owned())
+        });
         self.writer.restore(parts.rows)?;
         Ok(replay)
     }
@@ -106,6 +115,8 @@ impl BackEnd {
             counts: self.counts(),
             on_map: self.on_map,
             undisputed: self.undisputed,
+            disagreements: self.disagreements.clone(),
+            tracker: self.tracker.clone(),
             instructions,
             seconds,
         };
@@ -129,11 +140,12 @@ impl BackEnd {
         let MapperLink { frames, instructions } = link;
         let is_live = self.settings.arrival == Arrival::RealTime;
         let (mut next, mut flushed) = (None, Instant::now());
-        while let Some(frame) = next.take().or_else(|| frames.recv().ok()) {
+        while let Some(mut frame) = next.take().or_else(|| frames.recv().ok()) {
             if is_live {
                 next = frames.try_recv().ok();
             }
             let index = frame.index;
+            let spent = std::mem::replace(&mut self.tracker, frame.knows.take().unwrap_or_default());
             let instruction = if next.is_some() {
                 // Behind the camera: only the newest frame is mapped.
                 self.record(&frame)?;
@@ -150,7 +162,7 @@ impl BackEnd {
                 keeper.note(index, &instruction);
             }
             // A tracker that is gone needs no instructions.
-            let _ = instructions.send(instruction);
+            let _ = instructions.send(Instruction { spent: spent.into_memory(), ..instruction });
             if flushed.elapsed() >= FLUSH_EVERY {
                 self.writer.flush()?;
                 flushed = Instant::now();
@@ -172,6 +184,11 @@ impl BackEnd {
         Ok(())
     }
 
+    /// How far picture and depth contradict each other in the median frame.
+    pub(super) fn disagreement(&self) -> f64 {
+        median(&self.disagreements)
+    }
+
     /// The map, the run, what was counted, and what keeps it.
     pub(super) fn finish(self) -> (GrowingMap, RunWriter, SlamFigures, Option<Keeper>) {
         let (loops, retired_keyframes) = (self.loops.closed(), self.map.retired);
@@ -182,6 +199,7 @@ impl BackEnd {
     /// Adds a frame to the run; returns its exposure.
     fn record(&mut self, frame: &TrackedFrame) -> Result<TimedExposure, RunError> {
         let exposure = self.in_this_world(&frame.exposure, frame.moves);
+        self.disagreements.extend(frame.disagreement);
         // The frame before is moved as the world has been since.
         if let Some((index, revised, blur_px)) = &frame.revision {
             let revised = self.in_this_world(revised, frame.moves);
@@ -215,7 +233,7 @@ impl BackEnd {
             FrameStatus::Lost => {
                 let reference = self.loops.find(&self.map, &image);
                 self.figures.relocalisations += usize::from(reference.is_some());
-                Ok(Instruction { world_move: None, reference })
+                Ok(Instruction { reference, ..Instruction::default() })
             }
             FrameStatus::Ok => Ok(self.map_frame(exposure, frame.record.blur_px, &image, goes_on)),
             FrameStatus::Weak => {
@@ -245,7 +263,7 @@ impl BackEnd {
             pose = new_world_from_world.compose(&pose);
         }
         self.map.work(&pose, goes_on);
-        Instruction { world_move, reference: self.reference(&pose, image) }
+        Instruction { world_move, reference: self.reference(&pose, image), ..Instruction::default() }
     }
 
     /// Moves map and run if the newest keyframe shows that they have drifted; returns what happened around it.

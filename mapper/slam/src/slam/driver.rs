@@ -14,9 +14,7 @@ use mba_tracker::{SimdLevel, TrackerConfig};
 use super::back_end::{BackEnd, keyframe_images, keyframes};
 use super::messages::link;
 use super::progress::SlamProgress;
-use super::saved::{
-    Counts, Keeper, MapperParts, RefiningParts, Replay, Saved, SavedKeyframe, Saving, identity,
-};
+use super::saved::{Counts, Keeper, MapperParts, RefiningParts, Saved, SavedKeyframe, Saving, identity};
 use super::settings::{Arrival, SlamSettings};
 use super::{SlamError, front_end};
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
@@ -56,9 +54,9 @@ pub fn run_slam(
     let refinement = match saved {
         None => run.grow(writer, keeper, None, &mut observe)?,
         Some(Saved::Growing { mapper, state }) => {
-            run.grow(writer, keeper, Some((mapper, state)), &mut observe)?
+            run.grow(writer, keeper, Some((*mapper, state)), &mut observe)?
         }
-        Some(Saved::Refining { parts, state }) => run.restore_refinement(writer, keeper, parts, state)?,
+        Some(Saved::Refining { parts, state }) => run.restore_refinement(writer, keeper, *parts, state)?,
     };
     run.refine(refinement, observe)
 }
@@ -101,21 +99,25 @@ impl SlamRun<'_> {
         let earlier = stopped.as_ref().map_or(0.0, |(parts, _)| parts.seconds);
         let replay = match stopped {
             Some((parts, state)) => back_end.restore(dataset, parts, state)?,
-            None => Replay::default(),
+            None => None,
         };
         // Two threads: the tracker ends when the data set does or nobody listens, the mapper when no frame comes.
         let (tracker_link, mapper_link) = link();
-        let disagreement = thread::scope(|scope| {
+        thread::scope(|scope| {
             let tracking =
                 scope.spawn(|| front_end::run(dataset, config, settings.arrival, tracker_link, replay));
             let mapped = back_end.run(mapper_link, observe);
             let tracked = tracking.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
             mapped?;
-            Ok::<_, SlamError>(tracked?)
+            tracked.map_err(|error| match error {
+                TrackingError::Checkpoint(error) => error.into(),
+                error => SlamError::from(error),
+            })
         })?;
         let live_seconds = earlier + started.elapsed().as_secs_f64();
         // The whole map is known only now.
         back_end.find_lost(dataset);
+        let disagreement = back_end.disagreement();
         let (mut grown, mut writer, figures, keeper) = back_end.finish();
         if let Some(lag) = depth_lag_of_tracked(dataset, disagreement) {
             writer.warn(lag.to_string());

@@ -1,98 +1,66 @@
 //! The tracker's thread.
 
-use std::collections::VecDeque;
 use std::time::Instant;
 
+use mba_io::checkpoint::CheckpointError;
 use mba_io::dataset::Dataset;
-use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
 
 use super::arrival_clock::Pace;
-use super::messages::{Instruction, SharpView, Skipped, TrackedFrame, TrackerLink};
+use super::messages::{AHEAD, Instruction, SharpView, Skipped, TrackedFrame, TrackerLink};
 use super::saved::Replay;
 use super::settings::Arrival;
+use super::tracker_state::{ThreadState, TrackerState};
 use crate::tracking::{TrackingError, add_gyroscope, held, record, timed, timed_result, tracker_view};
-use crate::uncertainty::Uncertainty;
-
-/// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
-/// tracked.
-const AHEAD: usize = 2;
 
 /// What the tracker's thread is made of.
 struct FrontEnd<'a, 'm> {
     dataset: &'a Dataset,
     tracker: Tracker<'m>,
     link: &'a TrackerLink,
-    /// Index in the data set of every frame that the tracker was given.
-    given: Given,
-    moves: usize,
-    /// The last exposure, for frames without one.
-    last: Option<TimedExposure>,
-    uncertainty: Uncertainty,
+    state: ThreadState,
+    /// Memory for states that are handed over.
+    spent: Vec<Vec<u8>>,
 }
 
-/// The tracker counts the frames it was given, the run those of the data set; only the last few are asked for.
-#[derive(Default)]
-struct Given {
-    count: usize,
-    recent: VecDeque<usize>,
-}
-
-impl Given {
-    fn push(&mut self, index: usize) {
-        self.recent.push_back(index);
-        self.count += 1;
-        if self.recent.len() > 8 {
-            self.recent.pop_front();
-        }
-    }
-
-    fn index(&self, number: usize) -> Option<usize> {
-        let first = self.count - self.recent.len();
-        self.recent.get(number.checked_sub(first)?).copied()
-    }
-}
-
-/// Tracks the data set frame by frame until its end, or until nobody listens any more. Frames that were mapped before are
-/// tracked as they were then. Returns how far picture and depth contradict each other in the median frame.
+/// Tracks the data set frame by frame until its end, or until nobody listens any more, from the first frame that was not
+/// mapped before.
 pub(super) fn run(
     dataset: &Dataset,
     config: &TrackerConfig,
     arrival: Arrival,
     link: TrackerLink,
-    mut replay: Replay,
-) -> Result<f64, TrackingError> {
+    mut replay: Option<Replay>,
+) -> Result<(), TrackingError> {
     let mut memory = vec![0; config.workspace_len()];
-    let tracker = Tracker::new(config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
-    let given = Given::default();
-    let mut front_end = FrontEnd {
-        dataset,
-        tracker,
-        link: &link,
-        given,
-        moves: 0,
-        last: None,
-        uncertainty: Uncertainty::default(),
-    };
+    let mut tracker = Tracker::new(config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
+    let (mut state, mut first) = (ThreadState::default(), 0);
+    if let Some(replay) = &mut replay {
+        first = replay.frames;
+        let unsound = |reason| CheckpointError::Session { path: replay.path.clone(), reason };
+        state = std::mem::take(&mut replay.knows).restore(&mut tracker).map_err(unsound)?;
+    }
+    let mut front_end = FrontEnd { dataset, tracker, link: &link, state, spent: Vec::new() };
     let pace = Pace::new(arrival, dataset.timestamp(0), 1.0 / dataset.calibration().frame_rate);
-    for index in 0..dataset.len() {
+    for index in first..dataset.len() {
         let arrived = pace.wait_for(dataset.timestamp(index));
-        // What a run that was stopped was told is told again; the mapper only gets frames that are new to it.
-        let told_before = index.checked_sub(AHEAD).filter(|told| replay.has(*told));
-        let instructions = match told_before {
-            Some(told) => Some(vec![replay.take(told)]),
-            None => front_end.instructions(arrival, index),
+        // What a run that was stopped was told after its last frames is told again.
+        let told_before = index.checked_sub(AHEAD).filter(|told| *told < first);
+        let instructions = match (told_before, &mut replay) {
+            (Some(told), Some(replay)) => Some(vec![replay.take(told)]),
+            _ => front_end.instructions(arrival, index),
         };
         let Some(instructions) = instructions else { break };
-        let tracked =
+        let mut tracked =
             if arrived { front_end.track(index, instructions) } else { front_end.skip(index, Skipped::Late) };
-        if !replay.has(index) && link.frames.send(tracked).is_err() {
+        tracked.knows = (arrival == Arrival::LockStep).then(|| front_end.known());
+        if link.frames.send(tracked).is_err() {
             break;
         }
     }
-    Ok(front_end.uncertainty.disagreement())
+    Ok(())
 }
 
 impl FrontEnd<'_, '_> {
@@ -116,7 +84,7 @@ impl FrontEnd<'_, '_> {
             (Ok(()), Ok(image)) => image,
         };
         let begin = Instant::now();
-        let previous = self.given.recent.back().copied();
+        let previous = self.state.recent.newest();
         let tracked = tracker_view(&image).and_then(|mut frame| {
             add_gyroscope(&mut frame, self.dataset, previous);
             self.tracker.track(&frame)
@@ -126,38 +94,55 @@ impl FrontEnd<'_, '_> {
             Err(reason) => return self.skip(index, Skipped::Unusable(reason.to_string())),
         };
         let ms = (begin.elapsed() + following).as_secs_f64() * 1e3;
-        self.given.push(index);
-        self.uncertainty.add(&result);
+        self.state.recent.push(index);
         // Indices of the tracker become those of the data set.
         let revision = result.revision.as_ref().and_then(|revision| {
-            let revised = self.given.index(revision.index)?;
+            let revised = self.state.recent.index(revision.index)?;
             let timestamp = self.dataset.timestamp(revised);
             let exposure = timed(timestamp, &revision.world_from_camera, &revision.world_from_mid);
             Some((revised, exposure, f64::from(revision.blur)))
         });
         let exposure = timed_result(&result);
-        self.last = Some(exposure);
+        self.state.last = Some(exposure);
         let record = record(&result, ms);
         TrackedFrame {
             index,
             exposure,
             record,
-            moves: self.moves,
+            moves: self.state.moves,
             image: Some(image),
             skipped: None,
             revision,
+            disagreement: Some(result.disagreement),
+            knows: None,
         }
     }
 
     fn skip(&mut self, index: usize, reason: Skipped) -> TrackedFrame {
-        let (exposure, record) = held(self.dataset.timestamp(index), self.last.as_ref());
-        let (moves, skipped) = (self.moves, Some(reason));
-        TrackedFrame { index, exposure, record, moves, image: None, skipped, revision: None }
+        let (exposure, record) = held(self.dataset.timestamp(index), self.state.last.as_ref());
+        let (moves, skipped) = (self.state.moves, Some(reason));
+        TrackedFrame {
+            index,
+            exposure,
+            record,
+            moves,
+            image: None,
+            skipped,
+            revision: None,
+            disagreement: None,
+            knows: None,
+        }
+    }
+
+    /// What is known now.
+    fn known(&mut self) -> TrackerState {
+        TrackerState::of(&mut self.tracker, &self.state, self.spent.pop().unwrap_or_default())
     }
 
     fn follow(&mut self, instruction: Instruction) -> Result<(), TrackError> {
+        self.spent.extend(Some(instruction.spent).filter(|spent| spent.capacity() > 0));
         if let Some(new_world_from_world) = instruction.world_move {
-            self.moves += 1;
+            self.state.moves += 1;
             self.move_world(&new_world_from_world)?;
         }
         match instruction.reference {
@@ -167,7 +152,7 @@ impl FrontEnd<'_, '_> {
     }
 
     fn move_world(&mut self, new_world_from_world: &RigidTransform) -> Result<(), TrackError> {
-        if let Some(last) = &mut self.last {
+        if let Some(last) = &mut self.state.last {
             *last = last.seen_from(new_world_from_world);
         }
         self.tracker.move_world(new_world_from_world)

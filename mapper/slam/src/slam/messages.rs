@@ -9,7 +9,12 @@ use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 
+use super::tracker_state::TrackerState;
 use crate::run::FrameRecord;
+
+/// Frames that the tracker is ahead of its instructions in lock step: while the mapper works on one frame, the next is
+/// tracked.
+pub(super) const AHEAD: usize = 2;
 
 /// Frames that wait for the mapper at the most; the tracker waits for a place when there are more.
 const WAITING_FRAMES: usize = 4;
@@ -29,6 +34,10 @@ pub(super) struct TrackedFrame {
     pub(super) skipped: Option<Skipped>,
     /// Index, exposure and blur in pixels of an earlier frame of which more is known now.
     pub(super) revision: Option<(usize, TimedExposure, f64)>,
+    /// How far picture and depth contradict each other, if the frame was tracked.
+    pub(super) disagreement: Option<f64>,
+    /// What the tracker's thread knows after this frame, in lock step.
+    pub(super) knows: Option<TrackerState>,
 }
 
 /// Why a frame was not tracked.
@@ -47,6 +56,8 @@ pub(super) struct Instruction {
     pub(super) world_move: Option<RigidTransform>,
     /// What the next frames are compared with.
     pub(super) reference: Option<SharpView>,
+    /// Memory of a [`TrackerState`] that is not needed any more.
+    pub(super) spent: Vec<u8>,
 }
 
 /// A sharp view of the map.

@@ -25,6 +25,7 @@ mod relocaliser;
 mod saved;
 mod settings;
 mod sharp_view;
+mod tracker_state;
 
 pub use driver::run_slam;
 pub use error::SlamError;

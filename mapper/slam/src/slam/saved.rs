@@ -1,10 +1,11 @@
 //! Checkpoints of a run in lock step.
 //!
-//! While frames come in, a checkpoint holds what the mapper knows, and what it told the tracker. The tracker itself is not
-//! stored: it tracks the frames so far once more, which takes a hundredth of the time that mapping them took, and follows
-//! the same instructions. Keyframes' images and descriptions of places come from the data set again.
+//! While frames come in, a checkpoint holds what the mapper knows, what the tracker knew after the newest frame that was
+//! mapped, and what the mapper has told it that it had not heard of by then. Keyframes' images and descriptions of places
+//! come from the data set again.
 
-use std::path::PathBuf;
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use mba_adjust::bundle::{BundleState, MapKeyframe};
@@ -14,24 +15,22 @@ use mba_io::dataset::Dataset;
 use serde::{Deserialize, Serialize};
 
 use super::SlamSettings;
-use super::messages::{Instruction, SharpView};
+use super::messages::{AHEAD, Instruction, SharpView};
+use super::tracker_state::TrackerState;
 use crate::mapping::{Running, dataset_fingerprint};
 use crate::run::RunRows;
 
 /// Layout of the content.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// Time until the first checkpoint: a run that is stopped sooner has nothing worth keeping.
 const FIRST_AFTER: Duration = Duration::from_secs(1);
 
-/// Bytes of the views that the tracker was given above which no more checkpoints are written.
-const MOST_VIEW_BYTES: usize = 512 << 20;
-
 /// A checkpoint as it is read.
 #[derive(Deserialize)]
 pub(super) enum Saved {
-    Growing { mapper: MapperParts, state: BundleState },
-    Refining { parts: RefiningParts, state: BundleState },
+    Growing { mapper: Box<MapperParts>, state: BundleState },
+    Refining { parts: Box<RefiningParts>, state: BundleState },
 }
 
 /// The same as it is written.
@@ -53,7 +52,12 @@ pub(super) struct MapperParts {
     pub(super) counts: Counts,
     pub(super) on_map: bool,
     pub(super) undisputed: usize,
-    pub(super) instructions: Vec<(usize, SavedInstruction)>,
+    /// How far picture and depth contradict each other, of each frame that was tracked.
+    pub(super) disagreements: Vec<f64>,
+    /// What the tracker's thread knew after the newest frame.
+    pub(super) tracker: TrackerState,
+    /// What the tracker was told after frames of which it had not heard by then.
+    pub(super) instructions: VecDeque<(usize, SavedInstruction)>,
     /// Seconds that the run took so far.
     pub(super) seconds: f64,
 }
@@ -135,16 +139,12 @@ impl SavedInstruction {
             world_from_camera: numbers(&view.world_from_camera),
             start_from: view.start_from.as_ref().map(numbers),
         };
-        let Instruction { world_move, reference } = instruction;
+        let Instruction { world_move, reference, spent: _ } = instruction;
         let says_something = world_move.is_some() || reference.is_some();
         says_something.then(|| Self {
             world_move: world_move.as_ref().map(numbers),
             reference: reference.as_ref().map(view),
         })
-    }
-
-    fn bytes(&self) -> usize {
-        self.reference.as_ref().map_or(0, |view| view.rgb.len() + 2 * view.depth.len())
     }
 }
 
@@ -156,31 +156,39 @@ impl From<SavedInstruction> for Instruction {
             world_from_camera: pose(view.world_from_camera),
             start_from: view.start_from.map(pose),
         };
-        Self { world_move: saved.world_move.map(pose), reference: saved.reference.map(view) }
+        Self {
+            world_move: saved.world_move.map(pose),
+            reference: saved.reference.map(view),
+            ..Self::default()
+        }
     }
 }
 
-/// Frames that were mapped before, and what the tracker was told after them.
-#[derive(Default)]
+/// What the tracker's thread goes on from.
 pub(super) struct Replay {
-    frames: usize,
-    instructions: Vec<(usize, SavedInstruction)>,
+    /// Frames that were mapped before.
+    pub(super) frames: usize,
+    /// What the thread knew after the last of them.
+    pub(super) knows: TrackerState,
+    instructions: VecDeque<(usize, SavedInstruction)>,
+    /// The checkpoint that all this comes from.
+    pub(super) path: PathBuf,
 }
 
 impl Replay {
-    pub(super) fn new(frames: usize, instructions: Vec<(usize, SavedInstruction)>) -> Self {
-        Self { frames, instructions }
+    pub(super) fn new(
+        (frames, knows): (usize, TrackerState),
+        instructions: VecDeque<(usize, SavedInstruction)>,
+        path: PathBuf,
+    ) -> Self {
+        Self { frames, knows, instructions, path }
     }
 
-    /// Whether frame `index` was mapped before.
-    pub(super) fn has(&self, index: usize) -> bool {
-        index < self.frames
-    }
-
-    /// What the tracker was told after frame `index`.
+    /// What the tracker was told after frame `index`, which was mapped before.
     pub(super) fn take(&mut self, index: usize) -> Instruction {
         let known = self.instructions.iter().position(|(after, _)| *after == index);
-        known.map_or_else(Instruction::default, |at| self.instructions.swap_remove(at).1.into())
+        let told = known.and_then(|at| self.instructions.remove(at));
+        told.map_or_else(Instruction::default, |(_, told)| told.into())
     }
 }
 
@@ -193,21 +201,18 @@ pub(super) struct Keeper {
     /// Seconds of the run before it was stopped.
     earlier: f64,
     saved: Option<Instant>,
-    instructions: Vec<(usize, SavedInstruction)>,
-    /// Bytes of the views in them.
-    view_bytes: usize,
+    /// What the tracker has not heard of when it hands over the newest frame.
+    instructions: VecDeque<(usize, SavedInstruction)>,
 }
 
 impl Keeper {
     pub(super) fn new(path: PathBuf, identity: Identity, interval: Duration) -> Self {
         let started = Instant::now();
-        let (saved, instructions) = (None, Vec::new());
-        Self { path, identity, interval, started, earlier: 0.0, saved, instructions, view_bytes: 0 }
+        Self { path, identity, interval, started, earlier: 0.0, saved: None, instructions: VecDeque::new() }
     }
 
     /// Goes on after `seconds` in which these instructions were given.
-    pub(super) fn go_on(&mut self, seconds: f64, instructions: Vec<(usize, SavedInstruction)>) {
-        self.view_bytes = instructions.iter().map(|(_, instruction)| instruction.bytes()).sum();
+    pub(super) fn go_on(&mut self, seconds: f64, instructions: VecDeque<(usize, SavedInstruction)>) {
         (self.earlier, self.instructions) = (seconds, instructions);
     }
 
@@ -216,16 +221,18 @@ impl Keeper {
         self.earlier + self.started.elapsed().as_secs_f64()
     }
 
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
     pub(super) fn interval(&self) -> Duration {
         self.interval
     }
 
-    /// Notes what the tracker is told after frame `index`.
+    /// Notes what the tracker is told after frame `index`. Of what it was told [`AHEAD`] frames ago it has heard.
     pub(super) fn note(&mut self, index: usize, instruction: &Instruction) {
-        if let Some(saved) = SavedInstruction::of(instruction) {
-            self.view_bytes += saved.bytes();
-            self.instructions.push((index, saved));
-        }
+        self.instructions.retain(|(after, _)| after + AHEAD > index);
+        self.instructions.extend(SavedInstruction::of(instruction).map(|saved| (index, saved)));
     }
 
     /// Whether it is time for another checkpoint.
@@ -235,24 +242,15 @@ impl Keeper {
         waited >= wait
     }
 
-    /// Writes a checkpoint while frames come in, unless what the tracker was told is too much to keep; then the last one
-    /// stays.
+    /// Writes a checkpoint while frames come in.
     pub(super) fn save_growing(
         &mut self,
-        parts: impl FnOnce(Vec<(usize, SavedInstruction)>, f64) -> MapperParts,
+        parts: impl FnOnce(VecDeque<(usize, SavedInstruction)>, f64) -> MapperParts,
         state: &BundleState,
     ) -> Result<(), CheckpointError> {
         self.saved = Some(Instant::now());
-        if self.view_bytes > MOST_VIEW_BYTES {
-            return Ok(());
-        }
-        let mapper = Box::new(parts(std::mem::take(&mut self.instructions), self.seconds()));
-        let saving = Saving::Growing { mapper, state };
-        let written = self.write(&saving);
-        if let Saving::Growing { mapper, .. } = saving {
-            self.instructions = mapper.instructions;
-        }
-        written
+        let mapper = Box::new(parts(self.instructions.clone(), self.seconds()));
+        self.write(&Saving::Growing { mapper, state })
     }
 
     /// Writes a checkpoint.
@@ -293,18 +291,37 @@ mod tests {
             world_from_camera: some_pose(0.7),
             start_from: Some(some_pose(1e-9)),
         };
-        let told = Instruction { world_move: Some(some_pose(-2.0)), reference: Some(view) };
+        let told = Instruction {
+            world_move: Some(some_pose(-2.0)),
+            reference: Some(view),
+            ..Instruction::default()
+        };
         let mut keeper = Keeper::new("nowhere".into(), Identity::default(), Duration::from_secs(20));
         keeper.note(3, &Instruction::default());
         keeper.note(7, &told);
-        assert_eq!((keeper.instructions.len(), keeper.view_bytes), (1, 5));
+        assert_eq!(keeper.instructions.len(), 1);
         let bytes = postcard::to_stdvec(&keeper.instructions).unwrap();
-        let mut replay = Replay::new(9, postcard::from_bytes(&bytes).unwrap());
-        assert_eq!((replay.has(8), replay.has(9)), (true, false));
+        let mut replay = Replay::new(
+            (9, TrackerState::default()),
+            postcard::from_bytes(&bytes).unwrap(),
+            PathBuf::default(),
+        );
         assert!(replay.take(3).reference.is_none());
         // Debug formatting of numbers tells all bits apart but those of NaN.
         assert_eq!(format!("{:?}", replay.take(7)), format!("{told:?}"));
         assert!(replay.take(7).reference.is_none(), "an instruction is followed once");
+    }
+
+    #[test]
+    fn what_the_tracker_has_heard_of_is_not_kept() {
+        let mut keeper = Keeper::new("nowhere".into(), Identity::default(), Duration::from_secs(20));
+        let told = Instruction { world_move: Some(some_pose(1.0)), ..Instruction::default() };
+        (0..100).for_each(|index| keeper.note(index, &told));
+        let kept: Vec<usize> = keeper.instructions.iter().map(|(after, _)| *after).collect();
+        // Frame 99 was tracked with what it was told after frame 97.
+        assert_eq!(kept, [98, 99]);
+        keeper.note(100, &Instruction::default());
+        assert_eq!(keeper.instructions.len(), 1);
     }
 
     #[test]

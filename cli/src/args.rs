@@ -2,6 +2,7 @@
 
 pub mod export;
 pub mod import;
+pub mod localise;
 pub mod map;
 pub mod slam;
 pub mod submaps;
@@ -81,6 +82,8 @@ pub enum Command {
     Status(submaps::Status),
     /// Make one run with one map of the groups of a split run
     Merge(submaps::Merge),
+    /// Find the frames of another recording in the map of a RUN folder
+    Localise(localise::Localise),
     /// Render views of the map of a RUN folder from given poses
     Render(Render),
     /// Write the surface of the map of a RUN folder as a coloured mesh

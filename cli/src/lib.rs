@@ -84,6 +84,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Split(args) => commands::split::run(args, console),
         Command::Status(args) => commands::status::run(args, console),
         Command::Merge(args) => commands::merge::run(args, console),
+        Command::Localise(args) => commands::localise::run(args, console),
         Command::Render(args) => commands::render::run(args, console),
         Command::Mesh(args) => commands::mesh::run(args, console),
         Command::Export(args) => commands::export::run(args, console),

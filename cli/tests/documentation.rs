@@ -79,7 +79,10 @@ fn the_calls_on_the_own_data_set_work() {
         let errors = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "mba {}\n{errors}", call.join(" "));
     };
-    mba(&["synth", "--out", "data", "--frames", "8", "--size", "96x72", "--blur", "2"]);
+    // The second is filmed by another hand.
+    for (data, hand) in [("data", "1"), ("second", "2")] {
+        mba(&["synth", "--out", data, "--frames", "8", "--size", "96x72", "--blur", "2", "--seed", hand]);
+    }
     let program = fs::read_to_string(root().join("docs/program.md")).unwrap();
     // What films another sequence, or takes as long as a whole run.
     let left_out = ["demo", "synth", "slam", "ablate"];

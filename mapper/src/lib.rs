@@ -13,6 +13,8 @@
 //!
 //! [`submaps`] maps runs of any length: split into groups that independent processes map, and merged again.
 //!
+//! [`localisation`] finds the frames of another recording in the map of a run.
+//!
 //! [`places`] recognises where the camera has been before, and [`pose_graph`] spreads the drift that this uncovers.
 //!
 //! [`rendering`] makes images of a [`map`], with [`infill`] where it has nothing, and [`surfaces`] a [`mesh`];
@@ -27,6 +29,6 @@ pub use mba_io::{BinaryFileError, FileError, checkpoint, dataset, imu, output, s
 pub use mba_map::{infill, map, rendering, surfaces, viewer_splats};
 pub use mba_mesh as mesh;
 pub use mba_raster::{exposure, gaussians, losses, raster, sensor};
-pub use mba_slam::{export, hindsight, mapping, run, self_calibration, slam, tracking};
+pub use mba_slam::{export, hindsight, localisation, mapping, run, self_calibration, slam, tracking};
 pub use mba_submaps as submaps;
 pub use mba_synth as synth;

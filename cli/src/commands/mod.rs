@@ -12,6 +12,7 @@ pub mod export;
 pub mod import;
 pub mod info;
 pub mod job;
+pub mod localise;
 pub mod map;
 pub mod map_job;
 pub mod merge;

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use mba_mapper::evaluation::{BlurFigures, MotionPlausibility, TrajectoryFigures};
-use mba_mapper::run::{MapFigures, SlamFigures, Spread, Summary, UpSource, Upright};
+use mba_mapper::run::{LocalisationFigures, MapFigures, SlamFigures, Spread, Summary, UpSource, Upright};
 use mba_mapper::statistics::Statistics;
 
 /// The table of a trajectory evaluation, lengths in metres, angles in degrees.
@@ -74,6 +74,7 @@ pub fn summary(summary: &Summary) -> String {
         summary.blur.as_ref().map(blur),
         summary.map.as_ref().map(map),
         summary.slam.as_ref().map(|figures| pairs(&slam_rows(figures))),
+        summary.localisation.as_ref().map(localisation),
     ];
     for part in parts {
         text.extend(part.map(|part| "\n".to_owned() + &part));
@@ -152,6 +153,17 @@ pub fn slam_rows(figures: &SlamFigures) -> Vec<(&'static str, String)> {
         [("frames too late", figures.late_frames), ("keyframes given up", figures.retired_keyframes)];
     rows.extend(counts.iter().filter(|(_, n)| *n > 0).map(|(label, n)| (*label, n.to_string())));
     rows
+}
+
+/// How finding a recording in a map went.
+fn localisation(figures: &LocalisationFigures) -> String {
+    let LocalisationFigures { places, frames_on_map, recognised, recovered } = figures;
+    pairs(&[
+        ("places in the map", places.to_string()),
+        ("frames on the map", frames_on_map.to_string()),
+        ("times recognised", recognised.to_string()),
+        ("found afterwards", recovered.to_string()),
+    ])
 }
 
 /// Lines of label and value.

@@ -1,5 +1,7 @@
-//! From a tracked run or a data set to a RUN folder with a map: mapping, and tracking and mapping at once.
+//! From a tracked run or a data set to a RUN folder with a map: mapping, tracking and mapping at once, and finding a recording in
+//! the map of another run.
 
+pub mod localisation;
 pub mod mapping;
 pub mod slam;
 

@@ -1,6 +1,7 @@
 //! Tracking and mapping at the same time.
 
 mod field;
+mod localise;
 mod loops;
 mod quality;
 mod resume;

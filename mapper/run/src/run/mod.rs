@@ -37,7 +37,7 @@ pub use orientation::{start_view, up_direction};
 pub use reader::Run;
 pub use rows::RunRows;
 pub use stored_path::{path_of, stored_path};
-pub use summary::{FrameCounts, MapFigures, RunSettings, SlamFigures, Spread, Summary};
+pub use summary::{FrameCounts, LocalisationFigures, MapFigures, RunSettings, SlamFigures, Spread, Summary};
 pub use upright::{UpSource, Upright};
 pub use viewing::{for_viewers, is_own_splats};
 pub use writer::RunWriter;

@@ -73,6 +73,9 @@ pub struct Summary {
     /// What is known of tracking and mapping at the same time, when the run did that.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slam: Option<SlamFigures>,
+    /// How the frames were found in the map of another run, when that was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub localisation: Option<LocalisationFigures>,
     /// Present where the z axis of the world points up; the world is that of the first camera otherwise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub upright: Option<Upright>,
@@ -171,6 +174,20 @@ pub struct SlamFigures {
     pub retired_keyframes: usize,
 }
 
+/// How finding a recording in the map of another run went.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct LocalisationFigures {
+    /// Views of the map that a place could be recognised by.
+    pub places: usize,
+    /// Frames that were aligned with a view of the map; the others with one another.
+    pub frames_on_map: usize,
+    /// Times that the camera's place was recognised without any before it.
+    pub recognised: usize,
+    /// Lost frames that were found from their neighbours in the end.
+    pub recovered: usize,
+}
+
 /// Where the bulk and the tail of a quantity lie.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
@@ -230,6 +247,7 @@ impl Summary {
             plausibility: None,
             map: None,
             slam: None,
+            localisation: None,
             upright: None,
             warnings: Vec::new(),
         }

@@ -26,7 +26,7 @@ pub(super) struct Neighbour {
 }
 
 /// How far the picture moves between two poses, pixels, for a scene at `depth` metres.
-pub(super) fn view_change(a: &RigidTransform, b: &RigidTransform, camera: &PinholeCamera, depth: f64) -> f64 {
+pub(crate) fn view_change(a: &RigidTransform, b: &RigidTransform, camera: &PinholeCamera, depth: f64) -> f64 {
     let change = blur_length(&ExposureTrajectory { start: *a, end: *b }, camera, depth);
     // Points behind a camera that has turned away project anywhere.
     let turned = a.rotation.angle_to(&b.rotation) * camera.fx;

@@ -62,19 +62,19 @@ pub(super) struct Instruction {
 
 /// A sharp view of the map.
 #[derive(Debug)]
-pub(super) struct SharpView {
+pub(crate) struct SharpView {
     /// Red, green, blue of each pixel as the camera would have stored them, row by row.
-    pub(super) rgb: Vec<u8>,
+    pub(crate) rgb: Vec<u8>,
     /// Depth in the data set's raw units, 0 where it is not known.
-    pub(super) depth: Vec<u16>,
-    pub(super) world_from_camera: RigidTransform,
+    pub(crate) depth: Vec<u16>,
+    pub(crate) world_from_camera: RigidTransform,
     /// The tracker is lost and is to start again near this view, from that pose.
-    pub(super) start_from: Option<RigidTransform>,
+    pub(crate) start_from: Option<RigidTransform>,
 }
 
 impl SharpView {
     /// The view as the tracker takes it.
-    pub(super) fn reference(&self, camera: &PinholeCamera) -> Result<ReferenceView<'_>, TrackError> {
+    pub(crate) fn reference(&self, camera: &PinholeCamera) -> Result<ReferenceView<'_>, TrackError> {
         let PinholeCamera { width, height, .. } = *camera;
         Ok(ReferenceView {
             colour: ColourView::new(&self.rgb, width, height, 3 * width, PixelFormat::Rgb8)?,

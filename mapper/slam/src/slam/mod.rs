@@ -29,5 +29,8 @@ mod tracker_state;
 
 pub use driver::run_slam;
 pub use error::SlamError;
+pub(crate) use keyframe_choice::view_change;
+pub(crate) use messages::SharpView;
 pub use progress::SlamProgress;
+pub(crate) use relocaliser::Relocaliser;
 pub use settings::{Arrival, SlamReference, SlamSettings};

@@ -14,7 +14,7 @@ use crate::tracking::tracker_view;
 const MIN_INLIERS: f32 = 0.35;
 
 /// A tracker of its own, which starts anew for every question.
-pub(super) struct Relocaliser {
+pub(crate) struct Relocaliser {
     config: TrackerConfig,
     memory: Vec<u8>,
     deblurrer: KeyframeDeblurrer,
@@ -23,15 +23,17 @@ pub(super) struct Relocaliser {
 
 /// Where a frame was seen from, according to one view.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PoseMeasurement {
+pub(crate) struct PoseMeasurement {
     /// `world_from_camera` at mid exposure, in the world of the view's pose.
-    pub(super) world_from_camera: RigidTransform,
+    pub(crate) world_from_camera: RigidTransform,
     /// Robust photometric residual, standard deviations of the nominal noise.
     pub(super) residual: f32,
+    /// Share (0 to 1) of the view's patches that agree.
+    pub(crate) inliers: f32,
 }
 
 impl Relocaliser {
-    pub(super) fn new(config: &TrackerConfig) -> Self {
+    pub(crate) fn new(config: &TrackerConfig) -> Self {
         let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
         let deblur_memory = deblurrer.memory();
         let mut config = config.clone();
@@ -41,7 +43,7 @@ impl Relocaliser {
     }
 
     /// Aligns a frame with a view, from a guess of the frame's pose; `None` if they do not fit.
-    pub(super) fn align_to(
+    pub(crate) fn align_to(
         &mut self,
         image: &RgbdFrame,
         view: &SharpView,
@@ -56,6 +58,7 @@ impl Relocaliser {
         (result.status == FrameStatus::Ok && result.inliers > MIN_INLIERS).then_some(PoseMeasurement {
             world_from_camera: result.world_from_mid,
             residual: result.residual,
+            inliers: result.inliers,
         })
     }
 

@@ -6,4 +6,4 @@ pub mod mapping;
 pub mod slam;
 
 pub use mba_run::{export, run};
-pub use mba_tracking::{hindsight, self_calibration, tracking, uncertainty};
+pub use mba_tracking::{hindsight, self_calibration, tracking};

@@ -3,6 +3,6 @@
 pub mod hindsight;
 pub mod self_calibration;
 pub mod tracking;
-pub mod uncertainty;
+mod uncertainty;
 
 pub use mba_run::run;

@@ -1,5 +1,6 @@
 //! How uncertain poses are relative to the first frame.
 
+use mba_io::statistics::quantile;
 use mba_tracker::FrameResult;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -10,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// other beyond their noise (the ratio of Birge, as in averages of measurements that do not agree). A keyframe that is turned
 /// wrongly displaces what is far from it.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Uncertainty {
+pub(crate) struct Uncertainty {
     frames: Vec<Pose>,
     /// How far picture and depth contradict each other in each frame.
     disagreements: Vec<f64>,
@@ -46,23 +47,23 @@ impl Measured {
 
 impl Uncertainty {
     /// Median over the frames of how far picture and depth contradict each other: below 1 where only noise sets them apart.
-    pub fn disagreement(&self) -> f64 {
-        median(&self.disagreements)
+    pub(crate) fn disagreement(&self) -> f64 {
+        quantile(&self.disagreements, 0.5).unwrap_or(0.0)
     }
 
     /// What each frame was aligned with; `given` are the frames of the recording that were taken in.
-    pub fn measured(&self, given: &[usize]) -> Vec<Measured> {
+    pub(crate) fn measured(&self, given: &[usize]) -> Vec<Measured> {
         self.frames.iter().map(|frame| frame.measured.of_recording(given)).collect()
     }
 
     /// What the last frame was aligned with.
-    pub fn last_measured(&self, given: &[usize]) -> Measured {
+    pub(crate) fn last_measured(&self, given: &[usize]) -> Measured {
         self.frames.last().map(|frame| frame.measured.of_recording(given)).unwrap_or_default()
     }
 
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
     /// relative to the first frame. None where the frame was not aligned.
-    pub fn add(&mut self, result: &FrameResult) -> Option<f64> {
+    pub(crate) fn add(&mut self, result: &FrameResult) -> Option<f64> {
         self.disagreements.push(result.disagreement);
         let place = result.world_from_mid.translation;
         let start = Pose { place: place.into(), ..Pose::default() };
@@ -84,14 +85,6 @@ impl Uncertainty {
         let is_first = self.frames.len() == 1;
         (own.is_some() || is_first).then(|| pose.position.sqrt()).filter(|sigma| sigma.is_finite())
     }
-}
-
-/// The middle value, the upper one of two; 0 without values.
-#[must_use]
-pub fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Variances of position, square metres, and rotation, square radians, of a frame relative to what it was aligned with, all axes

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use mba_adjust::bundle::{BundleState, MapKeyframe, MapModel, PathPrior};
 use mba_io::checkpoint::exact_poses::{numbers, pose};
 use mba_io::dataset::{Dataset, RgbdFrame};
+use mba_io::statistics::quantile;
 use mba_io::trajectory_file::TimedExposure;
 use mba_raster::sensor::{ObservationPyramid, Sensor};
 use mba_tracker::TrackerConfig;
@@ -21,7 +22,6 @@ use super::settings::{Arrival, SlamReference, SlamSettings};
 use super::tracker_state::TrackerState;
 use crate::mapping::sensor;
 use crate::run::{FrameRecord, FrameStatus, RunError, RunWriter, SlamFigures};
-use crate::uncertainty::median;
 
 /// Time after which the folder is brought up to date: a run that is killed loses no more.
 const FLUSH_EVERY: Duration = Duration::from_secs(2);
@@ -186,7 +186,7 @@ impl BackEnd {
 
     /// How far picture and depth contradict each other in the median frame.
     pub(super) fn disagreement(&self) -> f64 {
-        median(&self.disagreements)
+        quantile(&self.disagreements, 0.5).unwrap_or(0.0)
     }
 
     /// The map, the run, what was counted, and what keeps it.

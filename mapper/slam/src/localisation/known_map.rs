@@ -46,12 +46,6 @@ impl<'a> KnownMap<'a> {
         self.places.len()
     }
 
-    /// `world_from_camera` of a frame of which nothing is known; none where no place of the map is recognised in it.
-    #[must_use]
-    pub fn pose_of(&mut self, image: &RgbdFrame) -> Option<RigidTransform> {
-        self.find(image).and_then(|view| view.start_from)
-    }
-
     /// What the map shows from a pose, unless it shows too little to align a frame with.
     pub(super) fn view(&mut self, world_from_camera: &RigidTransform) -> Option<SharpView> {
         let view = self.renderer.render(world_from_camera, Behind::Surroundings);

@@ -23,18 +23,8 @@ pub fn write(
     for (TimedPose { timestamp, world_from_camera }, status, keyframe) in frames {
         let [start, mid, end] = [*world_from_camera; 3];
         let record = FrameRecord {
-            timestamp: *timestamp,
-            status: *status,
             keyframe: u8::from(*keyframe),
-            ms: 1.0,
-            blur_px: 0.0,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 1.0,
-            inliers: 1.0,
-            gain: 1.0,
-            sigma_m: None,
-            reason: None,
+            ..FrameRecord::without_figures(*timestamp, *status)
         };
         writer.push(TimedExposure { timestamp: *timestamp, start, mid, end }, record).expect("a frame");
     }

@@ -47,19 +47,9 @@ mod tests {
     #[test]
     fn the_sharpest_of_every_stretch_is_chosen() {
         let blurs = [5.0, 2.0, 4.0, 8.0, 7.0, 1.0, 3.0];
-        let record = |blur_px: &f64| FrameRecord {
-            timestamp: 0.0,
-            status: if *blur_px == 1.0 { FrameStatus::Lost } else { FrameStatus::Ok },
-            keyframe: 0,
-            ms: 1.0,
-            blur_px: *blur_px,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 0.01,
-            inliers: 1.0,
-            gain: 1.0,
-            sigma_m: None,
-            reason: None,
+        let record = |blur_px: &f64| {
+            let status = if *blur_px == 1.0 { FrameStatus::Lost } else { FrameStatus::Ok };
+            FrameRecord { blur_px: *blur_px, ..FrameRecord::without_figures(0.0, status) }
         };
         let records: Vec<FrameRecord> = blurs.iter().map(record).collect();
         let exposure = |k: usize| {

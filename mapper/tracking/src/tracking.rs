@@ -317,22 +317,11 @@ fn reason(doubt: Doubt) -> Reason {
 
 /// The stand-in for a frame without a result: a camera that stays where it was.
 pub fn held(timestamp: f64, last: Option<&TimedExposure>) -> (TimedExposure, FrameRecord) {
-    // Nothing is known of it: every figure that does not exist is NaN.
     let pose = last.map_or_else(RigidTransform::identity, |exposure| exposure.mid);
     let exposure = TimedExposure { timestamp, start: pose, mid: pose, end: pose };
     let record = FrameRecord {
-        timestamp,
-        status: FrameStatus::Lost,
-        keyframe: 0,
-        ms: f64::NAN,
-        blur_px: f64::NAN,
-        virtual_views: 0,
-        iterations: 0,
-        residual: f64::NAN,
-        inliers: 0.0,
-        gain: f64::NAN,
-        sigma_m: None,
         reason: Some(Reason::Skipped),
+        ..FrameRecord::without_figures(timestamp, FrameStatus::Lost)
     };
     (exposure, record)
 }

@@ -141,20 +141,7 @@ fn describe() -> RunSettings {
 fn true_run(dataset: &Dataset, folder: &Path) -> Run {
     let mut writer = RunWriter::create_in(folder, describe()).expect("a writable folder");
     for exposure in dataset.ground_truth_exposures() {
-        let record = FrameRecord {
-            timestamp: exposure.timestamp,
-            status: FrameStatus::Ok,
-            keyframe: 0,
-            ms: 1.0,
-            blur_px: 1.0,
-            virtual_views: 3,
-            iterations: 3,
-            residual: 0.01,
-            inliers: 1.0,
-            gain: 1.0,
-            sigma_m: None,
-            reason: None,
-        };
+        let record = FrameRecord::without_figures(exposure.timestamp, FrameStatus::Ok);
         writer.push(*exposure, record).expect("a writable folder");
     }
     writer.finish(|_| ()).expect("a writable folder");

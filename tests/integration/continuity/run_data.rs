@@ -10,20 +10,7 @@ use crate::shaken::{FRAMES, Shaken};
 
 fn record(timestamp: f64, status: FrameStatus) -> FrameRecord {
     let residual = if status == FrameStatus::Lost { f64::NAN } else { 1.2 };
-    FrameRecord {
-        timestamp,
-        status,
-        keyframe: 0,
-        ms: 5.0,
-        blur_px: 4.0,
-        virtual_views: 8,
-        iterations: 9,
-        residual,
-        inliers: 0.9,
-        gain: 1.0,
-        sigma_m: None,
-        reason: None,
-    }
+    FrameRecord { residual, blur_px: 4.0, ..FrameRecord::without_figures(timestamp, status) }
 }
 
 #[test]

@@ -30,7 +30,7 @@ fn tiny_run() -> (TempDir, Run) {
         let timestamp = 0.5 * k as f64;
         let pose = RigidTransform::new(UnitQuaternion::identity(), Vector3::new(k as f64, 0.0, 0.0));
         let keyframe = u8::from(k == 0);
-        let record = FrameRecord { timestamp, keyframe, ..FrameRecord::example(status) };
+        let record = FrameRecord { keyframe, ..FrameRecord::without_figures(timestamp, status) };
         writer.push(TimedExposure { timestamp, start: pose, mid: pose, end: pose }, record).unwrap();
     }
     writer.write_deblurred(0, SIZE, (0..24).collect()).unwrap();

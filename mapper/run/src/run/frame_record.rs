@@ -51,21 +51,21 @@ pub struct FrameRecord {
     pub reason: Option<Reason>,
 }
 
-#[cfg(test)]
 impl FrameRecord {
-    /// A frame of some status for tests; at time 0 and no keyframe.
-    pub(crate) fn example(status: FrameStatus) -> Self {
+    /// A frame of a status of which nothing else is known: figures that do not exist are NaN, counts and shares are 0.
+    #[must_use]
+    pub fn without_figures(timestamp: f64, status: FrameStatus) -> Self {
         Self {
-            timestamp: 0.0,
+            timestamp,
             status,
             keyframe: 0,
-            ms: 1.0,
-            blur_px: 0.0,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 1.0,
-            inliers: 1.0,
-            gain: 1.0,
+            ms: f64::NAN,
+            blur_px: f64::NAN,
+            virtual_views: 0,
+            iterations: 0,
+            residual: f64::NAN,
+            inliers: 0.0,
+            gain: f64::NAN,
             sigma_m: None,
             reason: None,
         }

@@ -51,7 +51,7 @@ mod tests {
         let rotation = UnitQuaternion::from_scaled_axis(Vector3::z() * std::f64::consts::FRAC_PI_2);
         let mid = RigidTransform { rotation, translation: Vector3::zeros() };
         let exposure = TimedExposure { timestamp: 0.0, start: mid, mid, end: mid };
-        let frame = FrameRecord { keyframe: 1, ..FrameRecord::example(FrameStatus::Ok) };
+        let frame = FrameRecord { keyframe: 1, ..FrameRecord::without_figures(0.0, FrameStatus::Ok) };
         assert!((up_direction(None, &[exposure], &[frame]) - Vector3::x()).norm() < 1e-12);
         let upright = Upright { source: UpSource::Accelerometer, sigma_degrees: Some(0.5) };
         assert_eq!(up_direction(Some(&upright), &[exposure], &[frame]), Vector3::z());

@@ -23,20 +23,7 @@ mod tests {
     use super::*;
 
     fn record(status: FrameStatus, blur_px: f64) -> FrameRecord {
-        FrameRecord {
-            timestamp: 0.0,
-            status,
-            keyframe: 0,
-            ms: 1.0,
-            blur_px,
-            virtual_views: 1,
-            iterations: 1,
-            residual: 0.01,
-            inliers: 1.0,
-            gain: 1.0,
-            sigma_m: None,
-            reason: None,
-        }
+        FrameRecord { blur_px, ..FrameRecord::without_figures(0.0, status) }
     }
 
     #[test]

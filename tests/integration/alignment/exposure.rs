@@ -7,7 +7,7 @@ use mba_tests::plane_scene::PlaneScene;
 use mba_tracker::align::{AlignSettings, LevelOutcome, MotionPrior};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::trajectory::ExposureTrajectory;
-use mba_tracker::transfer::PatchSite;
+use mba_tracker::transfer::{PATTERN_DU, PATTERN_DV, PatchSite};
 use nalgebra::Vector6;
 
 use crate::pair::{Images, align, camera, estimate, prior};
@@ -96,6 +96,44 @@ fn patches_on_a_foreign_object_are_dropped() {
     check("foreign object", &outcome, 0.1, 0.4);
     assert!(plain >= 6, "{plain} patches were where the object is");
     assert_eq!(foreign, 0, "patches on the object were kept");
+}
+
+/// Standard deviation of the frame's light within the middle one of the patches, in standard deviations of nominal noise: that
+/// of a hundredth of the root of light and dark light together.
+fn middle_contrast(frame: &Images, sites: &[PatchSite], dark: f64) -> f64 {
+    let mut contrasts: Vec<f64> = sites
+        .iter()
+        .map(|site| {
+            let pixels = PATTERN_DU.iter().zip(&PATTERN_DV).map(|(du, dv)| {
+                let (u, v) = (i32::from(site.u) + du, i32::from(site.v) + dv);
+                f64::from(frame.grey[v as usize * camera().width + u as usize]) / 255.0
+            });
+            let light: Vec<f64> = pixels.collect();
+            let mean = light.iter().sum::<f64>() / light.len() as f64;
+            let variance = light.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / light.len() as f64;
+            100.0 * (variance / (mean + dark)).sqrt()
+        })
+        .collect();
+    contrasts.sort_by(f64::total_cmp);
+    contrasts[contrasts.len() / 2]
+}
+
+#[test]
+fn what_was_seen_before_fits_better_than_a_mean_and_another_place_does_not() {
+    let elsewhere = Images::blurred(&PlaneScene::corner(77, 0.12), &truth());
+    for (frame, is_same) in [(&*FRAME, true), (&elsewhere, false)] {
+        let settings = settings(false);
+        let (outcome, sites) = align(&KEYFRAME, frame, &settings, estimate(near()), &wide_prior());
+        let contrast = middle_contrast(frame, &sites, f64::from(settings.dark_intensity));
+        println!("residual {}, contrast {} ({contrast})", outcome.photometric_scale, outcome.contrast);
+        assert!(
+            (f64::from(outcome.contrast) / contrast - 1.0).abs() < 1e-3,
+            "{} {contrast}",
+            outcome.contrast
+        );
+        assert_eq!(outcome.photometric_scale < 0.5 * outcome.contrast, is_same);
+        assert_eq!(outcome.photometric_scale < outcome.contrast, is_same);
+    }
 }
 
 #[test]

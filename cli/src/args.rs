@@ -4,6 +4,7 @@ pub mod export;
 pub mod import;
 pub mod localise;
 pub mod map;
+pub mod shell;
 pub mod slam;
 pub mod submaps;
 pub mod surface;
@@ -97,6 +98,10 @@ pub enum Command {
     /// Measure an estimate against a reference
     #[command(subcommand)]
     Eval(EvalCommand),
+    /// Print what lets a shell complete commands and options
+    Completions(shell::Completions),
+    /// Print or write man pages
+    Man(shell::Man),
 }
 
 /// Arguments of `mba demo`.

@@ -93,5 +93,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Eval(EvalCommand::Trajectory(args)) => commands::eval_trajectory::run(args, console),
         Command::Eval(EvalCommand::Images(args)) => commands::eval_images::run(args, console),
         Command::Eval(EvalCommand::Mesh(args)) => commands::eval_mesh::run(args, console),
+        Command::Completions(args) => commands::completions::run(args, console),
+        Command::Man(args) => commands::man::run(args, console),
     }
 }

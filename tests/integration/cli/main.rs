@@ -17,6 +17,7 @@ mod outputs;
 mod real_camera;
 mod render;
 mod sensors;
+mod shell;
 mod slam;
 #[cfg(unix)]
 mod submaps;

@@ -171,7 +171,7 @@ pub struct Calibrate {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 RUN gets trajectory.txt (TUM lines at mid exposure), exposures.txt (poses at opening, middle and closing), \
-frames.csv, summary.json and deblurred/, the keyframes without their blur. It is kept up to date while the \
+frames.csv, summary.json, covariances.txt (6x6, of every pose) and deblurred/, the keyframes without their blur. It is kept up to date while the \
 run goes on. A run that was stopped, by a kill too, goes on with --resume and ends with the same files as one that was not.
 
 Examples:

@@ -8,6 +8,8 @@ use crate::whole_file::read_text;
 pub const TRAJECTORY_FILE: &str = "trajectory.txt";
 /// Name of the poses at opening, middle and closing of the shutter.
 pub const EXPOSURES_FILE: &str = "exposures.txt";
+/// Name of the covariances of the poses at mid exposure.
+pub const COVARIANCES_FILE: &str = "covariances.txt";
 /// Name of the table of frames.
 pub const FRAMES_FILE: &str = "frames.csv";
 /// Name of the summary.

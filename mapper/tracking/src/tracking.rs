@@ -187,6 +187,11 @@ pub fn track_and_keep(
             return Err(TrackingError::Stopped);
         }
     }
+    let mut covariances = vec![None; dataset.len()];
+    for (&index, covariance) in given.iter().zip(uncertainty.covariances()) {
+        covariances[index] = covariance;
+    }
+    run.set_covariances(covariances);
     Ok(Tracked {
         disagreement: uncertainty.disagreement(),
         measured: by_frame(dataset.len(), &given, &uncertainty),

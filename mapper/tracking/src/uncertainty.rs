@@ -1,8 +1,10 @@
 //! How uncertain poses are relative to the first frame.
 
+use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::statistics::quantile;
 use mba_tracker::FrameResult;
-use nalgebra::Vector3;
+use mba_tracker::geometry::{RigidTransform, so3};
+use nalgebra::{Matrix3, Matrix6};
 use serde::{Deserialize, Serialize};
 
 /// Adds up the uncertainty of each frame relative to its keyframe and that of the keyframe.
@@ -20,12 +22,9 @@ pub(crate) struct Uncertainty {
 /// Uncertainty of one frame relative to the first.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct Pose {
-    /// Variance of the position, all axes together, square metres.
-    position: f64,
-    /// Variance of the rotation, all axes together, square radians.
-    rotation: f64,
-    /// World, metres.
-    place: [f64; 3],
+    /// Columns of the covariance of the pose, translation in world axes, rotation in the camera's.
+    covariance: [[f64; 6]; 6],
+    world_from_mid: PoseNumbers,
     measured: Measured,
 }
 
@@ -61,38 +60,87 @@ impl Uncertainty {
         self.frames.last().map(|frame| frame.measured.of_recording(given)).unwrap_or_default()
     }
 
+    /// Covariance of each frame's pose at mid exposure relative to the first frame: translation in world axes, square metres,
+    /// then rotation in the camera's, square radians. None for the first frame and where a frame was not aligned.
+    pub(crate) fn covariances(&self) -> impl Iterator<Item = Option<Matrix6<f64>>> {
+        self.frames.iter().map(|frame| {
+            let covariance = Matrix6::from(frame.covariance);
+            let is_aligned = frame.measured.sigma.iter().all(|sigma| *sigma > 0.0);
+            // An alignment that left a direction open has an inverse that is no covariance.
+            (is_aligned && covariance.cholesky().is_some()).then_some(covariance)
+        })
+    }
+
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
     /// relative to the first frame. None where the frame was not aligned.
     pub(crate) fn add(&mut self, result: &FrameResult) -> Option<f64> {
         self.disagreements.push(result.disagreement);
-        let place = result.world_from_mid.translation;
-        let start = Pose { place: place.into(), ..Pose::default() };
+        let world_from_mid = result.world_from_mid;
+        let start = Pose { world_from_mid: numbers(&world_from_mid), ..Pose::default() };
         let reference = self.frames.get(result.reference_index).copied().unwrap_or(start);
-        let own = variances(result);
-        let [position, rotation] = own.unwrap_or_default();
-        // A small turn moves a point at distance d by d times its share across the line to it: two of three axes.
-        let lever = (place - Vector3::from(reference.place)).norm_squared() * reference.rotation * 2.0 / 3.0;
-        let pose = Pose {
-            position: reference.position + lever + position,
-            rotation: reference.rotation + rotation,
-            place: place.into(),
-            measured: Measured {
-                reference: result.reference_index,
-                sigma: [position, rotation].map(along_one_axis),
-            },
-        };
-        self.frames.push(pose);
+        let sigma = sigma_of(result);
+        let own = covariance(result).map(|own| own * exaggeration(result)).unwrap_or_default();
+        let world_from_reference = pose(reference.world_from_mid);
+        let covariance = chained(
+            &world_from_reference,
+            &world_from_reference.inverse().compose(&world_from_mid),
+            [&Matrix6::from(reference.covariance), &own],
+        );
+        self.frames.push(Pose {
+            covariance: covariance.into(),
+            world_from_mid: numbers(&world_from_mid),
+            measured: Measured { reference: result.reference_index, sigma: sigma.unwrap_or_default() },
+        });
         let is_first = self.frames.len() == 1;
-        (own.is_some() || is_first).then(|| pose.position.sqrt()).filter(|sigma| sigma.is_finite())
+        let [position, _] = variances(&covariance);
+        (sigma.is_some() || is_first).then(|| position.sqrt()).filter(|sigma| sigma.is_finite())
     }
 }
 
-/// Variances of position, square metres, and rotation, square radians, of a frame relative to what it was aligned with, all axes
-/// together; none where it was not aligned.
-fn variances(result: &FrameResult) -> Option<[f64; 2]> {
-    let covariance = result.information.try_inverse()?;
-    let variance = |first: usize| (first..first + 3).map(|i| covariance[(i, i)]).sum::<f64>();
-    Some([variance(0), variance(3)].map(|variance| variance * result.disagreement.max(1.0)))
+/// Covariance of the pose of a frame relative to what it was aligned with as the alignment says it, translation in the axes of
+/// that; none where it was not aligned.
+fn covariance(result: &FrameResult) -> Option<Matrix6<f64>> {
+    let of_all = result.information.try_inverse()?;
+    let of_pose = of_all.fixed_view::<6, 6>(0, 0);
+    // Rounding leaves the halves a little different.
+    Some((of_pose + of_pose.transpose()) * 0.5)
+}
+
+/// How many times larger variances are than an alignment says.
+fn exaggeration(result: &FrameResult) -> f64 {
+    result.disagreement.max(1.0)
+}
+
+/// Covariance of the pose of a frame that was aligned with a reference, from the covariances of the reference's pose and of
+/// the alignment; translations in the axes of the world and of the reference, rotations in the cameras'.
+fn chained(
+    world_from_reference: &RigidTransform,
+    reference_from_mid: &RigidTransform,
+    [of_reference, of_alignment]: [&Matrix6<f64>; 2],
+) -> Matrix6<f64> {
+    let turn = world_from_reference.rotation_matrix();
+    // A reference that is turned by a little moves what is far from it across the line to it.
+    let lever = -turn * so3::hat(&reference_from_mid.translation);
+    let by_reference =
+        blocks(&Matrix3::identity(), &lever, &reference_from_mid.rotation_matrix().transpose());
+    let by_alignment = blocks(&turn, &Matrix3::zeros(), &Matrix3::identity());
+    let sum = by_reference * of_reference * by_reference.transpose()
+        + by_alignment * of_alignment * by_alignment.transpose();
+    (sum + sum.transpose()) * 0.5
+}
+
+/// A matrix of blocks whose lower left one is zero.
+fn blocks(upper_left: &Matrix3<f64>, upper_right: &Matrix3<f64>, lower_right: &Matrix3<f64>) -> Matrix6<f64> {
+    let mut matrix = Matrix6::zeros();
+    matrix.fixed_view_mut::<3, 3>(0, 0).copy_from(upper_left);
+    matrix.fixed_view_mut::<3, 3>(0, 3).copy_from(upper_right);
+    matrix.fixed_view_mut::<3, 3>(3, 3).copy_from(lower_right);
+    matrix
+}
+
+/// Variances of position, square metres, and rotation, square radians, all axes together.
+fn variances(covariance: &Matrix6<f64>) -> [f64; 2] {
+    [0, 3].map(|first| (first..first + 3).map(|i| covariance[(i, i)]).sum())
 }
 
 /// Three axes share a variance.
@@ -102,5 +150,58 @@ fn along_one_axis(variance: f64) -> f64 {
 
 /// The standard deviations of [`Measured`].
 pub(crate) fn sigma_of(result: &FrameResult) -> Option<[f64; 2]> {
-    variances(result).map(|variances| variances.map(along_one_axis))
+    let variances = variances(&covariance(result)?);
+    Some(variances.map(|variance| along_one_axis(variance * exaggeration(result))))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Vector3, Vector6};
+
+    use super::*;
+
+    /// Numerical derivative of the pose of a frame by `vary`, which moves one of the two poses that it is the product of.
+    fn derivative(vary: impl Fn(&Vector6<f64>) -> RigidTransform) -> Matrix6<f64> {
+        let at = vary(&Vector6::zeros());
+        let step = 1e-5;
+        let column = |k: usize| {
+            let [ahead, behind] =
+                [step, -step].map(|step| at.tangent_to(&vary(&(Vector6::ith(k, 1.0) * step))));
+            (ahead - behind) / (2.0 * step)
+        };
+        Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(column))
+    }
+
+    fn spread(seed: f64) -> Matrix6<f64> {
+        let root = Matrix6::from_fn(|i, j| ((1.7 * i as f64 + 0.9 * j as f64) * seed).sin());
+        root * root.transpose() * 1e-4
+    }
+
+    #[test]
+    fn covariances_go_through_a_keyframe_as_poses_do() {
+        let world_from_reference =
+            RigidTransform::new(so3::exp(&Vector3::new(0.4, -0.8, 0.3)), Vector3::new(1.0, 2.0, -0.5));
+        let reference_from_mid =
+            RigidTransform::new(so3::exp(&Vector3::new(-0.2, 0.1, 0.5)), Vector3::new(0.3, -0.1, 0.8));
+        let by_reference =
+            derivative(|tangent| world_from_reference.perturbed(tangent).compose(&reference_from_mid));
+        let by_alignment =
+            derivative(|tangent| world_from_reference.compose(&reference_from_mid.perturbed(tangent)));
+        let [of_reference, of_alignment] = [spread(1.0), spread(2.3)];
+        let expected = by_reference * of_reference * by_reference.transpose()
+            + by_alignment * of_alignment * by_alignment.transpose();
+        let found = chained(&world_from_reference, &reference_from_mid, [&of_reference, &of_alignment]);
+        assert!((found - expected).amax() < 1e-9 * expected.amax(), "{found}{expected}");
+    }
+
+    #[test]
+    fn a_turned_keyframe_displaces_what_is_far_from_it_across_the_line_to_it() {
+        let away = RigidTransform { translation: Vector3::new(0.0, 0.0, 2.0), ..RigidTransform::identity() };
+        let turned = Matrix6::from_diagonal(&Vector6::new(0.0, 0.0, 0.0, 1e-4, 1e-4, 1e-4));
+        let found = chained(&RigidTransform::identity(), &away, [&turned, &Matrix6::zeros()]);
+        // Two metres times a hundredth of a radian.
+        for (axis, expected) in [(0, 4e-4), (1, 4e-4), (2, 0.0)] {
+            assert!((found[(axis, axis)] - expected).abs() < 1e-15, "{found}");
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod commands;
+mod covariances;
 mod eval_images;
 mod export;
 #[cfg(unix)]

@@ -130,6 +130,7 @@ fn earlier_results_are_replaced_and_notes_beside_them_stay() {
     let names: Vec<_> = left.keys().map(|path| path.to_str().unwrap()).collect();
     // Map, depth maps and images of the earlier run would belong to other poses.
     let expected = [
+        "covariances.txt",
         "deblurred",
         "deblurred/notes.png",
         "exposures.txt",

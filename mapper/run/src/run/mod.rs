@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `trajectory.txt` | camera-to-world at mid exposure, every input frame once, TUM lines |
 //! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
+//! | `covariances.txt` | covariance of the pose at mid exposure, of tracked runs, see [`RunWriter::set_covariances`] |
 //! | `frames.csv` | one [`FrameRecord`] per frame |
 //! | `summary.json` | a [`Summary`] |
 //! | `map.ply` | a map of Gaussians, see [`mba_raster::gaussians::read_ply`], with [colours and sizes for viewers](for_viewers), or |
@@ -13,6 +14,7 @@
 //! A file is written beside its place and then renamed, so a reader sees an old or a new version, never half of one.
 
 mod camera;
+mod covariances;
 mod deblurred_keyframes;
 mod earlier_images;
 mod error;
@@ -46,6 +48,6 @@ pub use writer::RunWriter;
 pub use mba_tracker::FrameStatus;
 
 pub use mba_io::run_layout::{
-    CHECKPOINT_FILE, DEBLURRED_FOLDER, DEPTH_FOLDER, EXPOSURES_FILE, FRAMES_FILE, SUMMARY_FILE,
-    TRAJECTORY_FILE, deblurred_path,
+    CHECKPOINT_FILE, COVARIANCES_FILE, DEBLURRED_FOLDER, DEPTH_FOLDER, EXPOSURES_FILE, FRAMES_FILE,
+    SUMMARY_FILE, TRAJECTORY_FILE, deblurred_path,
 };

@@ -11,12 +11,14 @@ use mba_io::whole_file::write_together;
 use mba_map::map::{FIELD_FILE, MAP_FILE, Scene, StoredMap};
 use mba_raster::gaussians::{ForViewers, Gaussians, write_ply, write_ply_for_viewers};
 use mba_tracker::geometry::RigidTransform;
+use nalgebra::Matrix6;
 
+use super::covariances::{format_covariances, turned};
 use super::earlier_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{
-    CHECKPOINT_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, FrameStatus, RunError, RunSettings,
-    SUMMARY_FILE, Summary, TRAJECTORY_FILE, Upright, frame_record,
+    CHECKPOINT_FILE, COVARIANCES_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, FrameStatus, RunError,
+    RunSettings, SUMMARY_FILE, Summary, TRAJECTORY_FILE, Upright, frame_record,
 };
 
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
@@ -37,6 +39,8 @@ pub struct RunWriter {
     settings: RunSettings,
     pub(super) exposures: Vec<TimedExposure>,
     pub(super) frames: Vec<FrameRecord>,
+    /// By frame; empty where nothing is known.
+    covariances: Vec<Option<Matrix6<f64>>>,
     pub(super) skipped: usize,
     deblurred: usize,
     pub(super) upright: Option<Upright>,
@@ -57,6 +61,7 @@ impl RunWriter {
             settings,
             exposures: Vec::new(),
             frames: Vec::new(),
+            covariances: Vec::new(),
             skipped: 0,
             deblurred: 0,
             upright: None,
@@ -87,6 +92,9 @@ impl RunWriter {
             return Ok(());
         }
         remove_keyframe_images(self.folder())?;
+        if self.covariances.is_empty() {
+            remove(&self.folder().join(COVARIANCES_FILE))?;
+        }
         // A map of the earlier run would be taken for one of this run.
         [MAP_FILE, FIELD_FILE].iter().try_for_each(|name| remove(&self.folder().join(name)))
     }
@@ -139,10 +147,25 @@ impl RunWriter {
         (record.status, record.blur_px) = (FrameStatus::Weak, 0.0);
     }
 
+    /// Notes the covariance of the pose at mid exposure of every frame that has one, relative to the first frame: translation in
+    /// world axes, square metres, before rotation in the camera's, square radians.
+    ///
+    /// # Panics
+    /// If there is not one entry per frame.
+    pub fn set_covariances(&mut self, covariances: Vec<Option<Matrix6<f64>>>) {
+        assert_eq!(covariances.len(), self.frames.len(), "covariances of another run");
+        self.covariances = covariances;
+        self.unwritten += 1;
+    }
+
     /// Moves every exposure to another world, which may be another one for each frame: `new_world_from_world` by index.
     pub fn move_world(&mut self, new_world_from_world: impl Fn(usize) -> RigidTransform) {
         for (index, exposure) in self.exposures.iter_mut().enumerate() {
-            *exposure = exposure.seen_from(&new_world_from_world(index));
+            let new_world_from_world = new_world_from_world(index);
+            *exposure = exposure.seen_from(&new_world_from_world);
+            if let Some(Some(covariance)) = self.covariances.get_mut(index) {
+                *covariance = turned(covariance, &new_world_from_world);
+            }
         }
         self.unwritten += self.exposures.len();
     }
@@ -324,13 +347,17 @@ impl RunWriter {
             RunError::unwritable(&self.folder().join(SUMMARY_FILE), io::Error::other(error))
         })?;
         let file = |name: &str, text: String| (self.folder().join(name), text);
-        write_together(&[
+        let mut files = vec![
             file(TRAJECTORY_FILE, format_trajectory(&poses)),
             file(EXPOSURES_FILE, format_exposures(&self.exposures)),
             file(FRAMES_FILE, frame_record::format_frames(&self.frames)),
-            file(SUMMARY_FILE, json + "\n"),
-        ])
-        .map_err(RunError::from_write)
+        ];
+        if !self.covariances.is_empty() {
+            files.push(file(COVARIANCES_FILE, format_covariances(&self.exposures, &self.covariances)));
+        }
+        // Last: a folder with a summary is a run.
+        files.push(file(SUMMARY_FILE, json + "\n"));
+        write_together(&files).map_err(RunError::from_write)
     }
 }
 

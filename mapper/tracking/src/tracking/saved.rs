@@ -16,7 +16,7 @@ use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use mba_io::dataset::Dataset;
 
 /// Layout of the content.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Time until the first checkpoint: a run that is stopped sooner has nothing worth keeping.
 const FIRST_AFTER: Duration = Duration::from_secs(1);

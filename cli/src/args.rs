@@ -1,5 +1,6 @@
 //! The command line.
 
+pub mod bench;
 pub mod export;
 pub mod import;
 pub mod localise;
@@ -77,6 +78,8 @@ pub enum Command {
     Slam(slam::Slam),
     /// Run slam with each part left out in turn and print what it is worth
     Ablate(slam::Ablate),
+    /// Run the sequences of a benchmark and print what has been published of them beside
+    Bench(bench::Bench),
     /// Split a tracked run of any length into groups that are mapped one by one, on one machine or many
     Split(submaps::Split),
     /// Show how far the groups of a split run are

@@ -81,6 +81,7 @@ fn dispatch(command: &Command, console: &Console) -> anyhow::Result<()> {
         Command::Map(args) => commands::map_job::run(args, console),
         Command::Slam(args) => commands::slam::run(args, console),
         Command::Ablate(args) => commands::ablate::run(args, console),
+        Command::Bench(args) => commands::bench::run(args, console),
         Command::Split(args) => commands::split::run(args, console),
         Command::Status(args) => commands::status::run(args, console),
         Command::Merge(args) => commands::merge::run(args, console),

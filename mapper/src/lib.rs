@@ -25,7 +25,9 @@ pub use mba_adjust::{bundle, continuity, deblurring, places, pose_graph};
 pub use mba_eval::{evaluation, image_folders};
 pub use mba_field::triplane;
 pub use mba_import as import;
-pub use mba_io::{BinaryFileError, FileError, checkpoint, dataset, imu, output, statistics, trajectory_file};
+pub use mba_io::{
+    BinaryFileError, FileError, checkpoint, dataset, imu, output, statistics, trajectory_file, whole_file,
+};
 pub use mba_map::{infill, map, rendering, surfaces, viewer_splats};
 pub use mba_mesh as mesh;
 pub use mba_raster::{exposure, gaussians, losses, raster, sensor};

@@ -2,6 +2,7 @@
 
 pub mod ablate;
 pub mod alignment;
+pub mod bench;
 pub mod calibrate;
 mod camera_facts;
 pub mod completions;
@@ -22,6 +23,7 @@ pub mod mesh;
 pub mod open;
 pub mod outcome;
 pub mod render;
+mod repeats;
 pub mod report;
 pub mod slam;
 pub mod split;

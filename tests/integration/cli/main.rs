@@ -1,6 +1,7 @@
 //! The program as its users meet it: a process with arguments, exit code, stdout and stderr.
 
 mod bad_input;
+mod bench;
 mod commands;
 mod covariances;
 mod eval_images;

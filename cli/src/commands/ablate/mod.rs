@@ -1,9 +1,9 @@
 //! `mba ablate`.
 
-mod repeats;
 mod slam;
 mod tracker;
 
+use super::repeats::Repeats;
 use super::{calibrate, open};
 use crate::args::Switch;
 use crate::args::slam::{Ablate, Ablated};
@@ -15,8 +15,9 @@ use crate::console::Console;
 /// As `mba slam` and `mba track`.
 pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
     let dataset = calibrate::completed(open::dataset(&args.dataset)?, Switch::On, console)?;
+    let repeats = Repeats { out: &args.out, count: args.repeats };
     match args.of {
-        Ablated::Slam => slam::run(&dataset, args, console),
-        Ablated::Track => tracker::run(&dataset, args, console),
+        Ablated::Slam => slam::run(&dataset, repeats, console),
+        Ablated::Track => tracker::run(&dataset, repeats, console),
     }
 }

@@ -4,9 +4,9 @@ use mba_mapper::dataset::Dataset;
 use mba_mapper::run::Summary;
 use serde::Serialize;
 
+use super::super::repeats::{self, Repeats, Spread, nudged, spread};
 use super::super::slam;
-use super::repeats::{self, Spread, nudged, spread};
-use crate::args::slam::{Ablate, Ablation, MapReference, Slamming};
+use crate::args::slam::{Ablation, MapReference, Slamming};
 use crate::args::{BlurMode, Switch};
 use crate::console::Console;
 use crate::interrupt::Resumption;
@@ -32,10 +32,10 @@ struct Row {
 ///
 /// # Errors
 /// As `mba slam`.
-pub(super) fn run(dataset: &Dataset, args: &Ablate, console: &Console) -> anyhow::Result<()> {
+pub(super) fn run(dataset: &Dataset, repeats: Repeats<'_>, console: &Console) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for (name, ablation) in variants() {
-        let summaries = repeats::summaries(args, name, console, |repeat, out| {
+        let summaries = repeats::summaries(repeats, name, console, |repeat, out| {
             let slamming = Slamming { ablation, ..Slamming::default() };
             let dataset = nudged(dataset, repeat)?;
             slam::slam_into(&dataset, out, (false, Resumption::Always), &slamming, console)

@@ -6,9 +6,8 @@ use mba_mapper::dataset::{Calibration, Dataset, DatasetError, Shutter};
 use mba_mapper::run::Summary;
 use serde::Serialize;
 
+use super::super::repeats::{self, Repeats, Spread, nudged, spread, with_same_sensors};
 use super::super::track;
-use super::repeats::{self, Spread, nudged, spread, with_same_sensors};
-use crate::args::slam::Ablate;
 use crate::args::{BlurMode, Reference, Switch, Tracking};
 use crate::console::Console;
 use crate::interrupt::Resumption;
@@ -107,10 +106,10 @@ impl Part {
 ///
 /// # Errors
 /// As `mba track`.
-pub(super) fn run(dataset: &Dataset, args: &Ablate, console: &Console) -> anyhow::Result<()> {
+pub(super) fn run(dataset: &Dataset, repeats: Repeats<'_>, console: &Console) -> anyhow::Result<()> {
     let mut rows = Vec::new();
     for part in Part::ALL.into_iter().filter(|part| part.is_in(dataset)) {
-        let summaries = repeats::summaries(args, part.name(), console, |repeat, out| {
+        let summaries = repeats::summaries(repeats, part.name(), console, |repeat, out| {
             let dataset = part.left_out(nudged(dataset, repeat)?)?;
             let how = (false, Resumption::Always);
             track::track_into(&dataset, out, how, CHECKPOINT_INTERVAL, &part.tracking(), console)

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use mba_mapper::dataset::{Calibration, Dataset, DatasetError};
 use mba_mapper::run::{Run, Summary};
 
-use crate::args::slam::Ablate;
 use crate::console::Console;
 
 /// Relative step between the focal lengths of repeated runs: a twentieth of a pixel in the corner, which nobody knows better.
@@ -17,30 +16,39 @@ const WIDTH: usize = 22;
 /// Middle, least and most of a figure over repeated runs; none where a run has none.
 pub(super) type Spread = Option<[f64; 3]>;
 
+/// How often something is run, and where.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Repeats<'a> {
+    /// Folder for the runs.
+    pub(super) out: &'a Path,
+    /// Runs of each row.
+    pub(super) count: u16,
+}
+
 /// The summaries of the repeated runs of the row `name`. A run that was finished before is not made again; `run` makes one, with
 /// its number from 0 and its folder.
 pub(super) fn summaries(
-    args: &Ablate,
+    repeats: Repeats<'_>,
     name: &str,
     console: &Console,
     run: impl Fn(u16, &Path) -> anyhow::Result<Summary>,
 ) -> anyhow::Result<Vec<Summary>> {
     let one = |repeat| {
-        let out = folder(args, name, repeat);
+        let out = folder(repeats.out, name, repeat);
         if let Some(summary) = finished(&out) {
             return Ok(summary);
         }
-        console.note(format!("{name}, run {} of {}:", repeat + 1, args.repeats));
+        console.note(format!("{name}, run {} of {}:", repeat + 1, repeats.count));
         run(repeat, &out)
     };
-    (0..args.repeats).map(one).collect()
+    (0..repeats.count).map(one).collect()
 }
 
-/// Folder of run `repeat`, counted from 0, of the row `name`.
-fn folder(args: &Ablate, name: &str, repeat: u16) -> PathBuf {
+/// Folder in `out` of run `repeat`, counted from 0, of the row `name`.
+fn folder(out: &Path, name: &str, repeat: u16) -> PathBuf {
     let name = name.replace(' ', "-");
     let name = if repeat == 0 { name } else { format!("{name}-{}", repeat + 1) };
-    args.out.join(name)
+    out.join(name)
 }
 
 /// The summary of a run that was finished before.
@@ -92,20 +100,19 @@ pub(super) fn table<'a, const N: usize>(
 ) -> String {
     let mut text = format!("{:WIDTH$}", "") + &head.map(|name| format!("{name:>WIDTH$}")).concat() + "\n";
     for (name, figures) in rows {
-        let cells = figures.map(|(spread, digits)| cell(spread, digits, WIDTH));
+        let cells = figures.map(|(spread, digits)| format!("{:>WIDTH$}", cell(spread, digits)));
         text += &format!("{name:WIDTH$}{}\n", cells.concat());
     }
     text
 }
 
 /// A figure with its spread, if there was more than one run.
-fn cell(spread: Spread, digits: usize, width: usize) -> String {
-    let text = match spread {
+pub(super) fn cell(spread: Spread, digits: usize) -> String {
+    match spread {
         None => "-".to_owned(),
         Some([middle, least, most]) if least == most => format!("{middle:.digits$}"),
         Some([middle, least, most]) => format!("{middle:.digits$} [{least:.digits$} {most:.digits$}]"),
-    };
-    format!("{text:>width$}")
+    }
 }
 
 #[cfg(test)]
@@ -117,7 +124,7 @@ mod tests {
         let values = [3.0, 1.0, 2.0, 5.0];
         assert_eq!(spread_of(values.iter().copied().map(Some)), Some([2.5, 1.0, 5.0]));
         assert_eq!(spread_of([Some(1.0), None].into_iter()), None);
-        assert_eq!(cell(Some([2.5, 1.0, 5.0]), 1, 14), " 2.5 [1.0 5.0]");
-        assert_eq!((cell(Some([2.5; 3]), 2, 6), cell(None, 2, 6)), ("  2.50".into(), "     -".into()));
+        assert_eq!(cell(Some([2.5, 1.0, 5.0]), 1), "2.5 [1.0 5.0]");
+        assert_eq!((cell(Some([2.5; 3]), 2), cell(None, 2)), ("2.50".into(), "-".into()));
     }
 }

@@ -13,7 +13,7 @@ cameras, exposure times, poses, inertia and confidence; a note says what is assu
   bags          ROS 1 (also of RealSense Viewer), MCAP of ROS 2 and others
   telephones    Stray Scanner, Record3D, Polycam raw data, 3D Scanner App
   desk          .sens of ScanNet, Open3D recorder, transforms.json with depth
-  benchmarks    7-Scenes, BundleFusion, ICL-NUIM, TUM, Bonn, ETH3D, Replica, ScanNet
+  benchmarks    7-Scenes, BundleFusion, ICL-NUIM, MBA-VO with ArchViz, TUM, Bonn, ETH3D, Replica, ScanNet
 
 docs/import.md has an example for each.
 

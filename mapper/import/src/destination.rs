@@ -13,17 +13,18 @@ use mba_tracker::geometry::RigidTransform;
 use crate::ImportError;
 use crate::facts::Facts;
 use crate::lists::{self, Timed, in_order};
-use crate::picture::Picture;
+use crate::picture::{Picture, colour_png};
 use crate::time::Time;
 
 const COLOUR: &str = "rgb";
 const DEPTH: &str = "depth";
 const CONFIDENCE: &str = "confidence";
 const MASK: &str = "mask";
+const SHARP: &str = "sharp";
 const CALIBRATION: &str = "calibration.toml";
 
 /// Folders of images, and the texts beside them.
-const FOLDERS: [&str; 4] = [COLOUR, DEPTH, CONFIDENCE, MASK];
+const FOLDERS: [&str; 5] = [COLOUR, DEPTH, CONFIDENCE, MASK, SHARP];
 const TEXTS: [&str; 8] = [
     "rgb.txt",
     "depth.txt",
@@ -164,6 +165,19 @@ impl Destination {
     ) -> Result<(), ImportError> {
         check_size(&mut self.colour_size, picture.header(origin)?.size, origin)?;
         picture.write(&self.place(&format!("{MASK}/{stem}.png"))?)
+    }
+
+    /// Adds the image without blur, of a file, of the colour image of that name; as [`Self::add_confidence`]. Results are
+    /// compared with PNG files.
+    pub(crate) fn add_sharp(&mut self, stem: &str, origin: &Path) -> Result<(), ImportError> {
+        let size = Picture::File(origin.to_owned()).header(origin)?.size;
+        check_size(&mut self.colour_size, size, origin)?;
+        let image = dataset::read_image(origin)
+            .map_err(|error| ImportError::damaged(origin, error.to_string()))?
+            .into_rgb8();
+        let png =
+            colour_png(size, &image).map_err(|error| ImportError::damaged(origin, error.to_string()))?;
+        Picture::Encoded(png).write(&self.place(&format!("{SHARP}/{stem}.png"))?)
     }
 
     /// Adds what the user should know, once.

@@ -17,6 +17,7 @@ const FORMATS: &[&Format] = &[
     &folders::polycam::FORMAT,
     &folders::scanner_app::FORMAT,
     &folders::transforms::FORMAT,
+    &folders::mba_vo::FORMAT,
     &folders::numbered::FORMAT,
     &folders::open3d::FORMAT,
     // It has the list of the layouts below, with numbers for times.

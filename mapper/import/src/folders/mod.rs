@@ -3,6 +3,7 @@
 mod camera;
 pub(crate) mod icl_nuim;
 pub(crate) mod layouts;
+pub(crate) mod mba_vo;
 pub(crate) mod numbered;
 pub(crate) mod open3d;
 pub(crate) mod polycam;

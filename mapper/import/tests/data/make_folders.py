@@ -185,6 +185,43 @@ def icl_nuim(folder):
     text(folder / "livingRoom0.gt.freiburg", "\n".join(truth) + "\n")
 
 
+def quaternion_of(r):
+    """x, y, z, w of a rotation: the eigenvector of the largest eigenvalue (Bar-Itzhack 2000)."""
+    vector = np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    matrix = np.zeros((4, 4))
+    matrix[:3, :3] = r + r.T - np.trace(r) * np.eye(3)
+    matrix[:3, 3] = matrix[3, :3] = vector
+    matrix[3, 3] = np.trace(r)
+    return [float(v) for v in np.linalg.eigh(matrix)[1][:, -1]]
+
+
+def mba_vo(folder):
+    """The body has x ahead, y left, z up; depth is the distance along the ray."""
+    from_camera = np.array([[0.0, 0, 1, 0], [-1, 0, 0, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+    y, x = np.mgrid[0 : DEPTH[1], 0 : DEPTH[0]]
+    focal, centre = (7.0, 7.25), (3.5, 2.5)
+    stretch = np.sqrt(1 + ((x - centre[0]) / focal[0]) ** 2 + ((y - centre[1]) / focal[1]) ** 2)
+    times, truth = [], ["# t qx qy qz qw x y z vx vy vz rx ry rz ax ay az"]
+    for k in range(FRAMES):
+        small = np.ascontiguousarray(colour(k)[: DEPTH[1], : DEPTH[0]])
+        image(folder / "rgb_blur" / f"{k + 7:04}.png", small)
+        image(folder / "rgb_sharp_middle" / f"{k + 7:04}.jpg", small, quality=95)
+        distances = depth(k) / 1000 * stretch
+        distances[0, 0] = 65504
+        text(folder / "depth_sharp_middle" / f"{k + 7:04}.depth", rows(distances))
+        times.append(f"{k * 0.0369 + 0.25} {k + 7:04}")
+        body = pose(k) @ np.linalg.inv(from_camera)
+        quaternion = quaternion_of(body[:3, :3])
+        numbers = quaternion + [float(v) for v in body[:3, 3]] + [0.0] * 9
+        truth.append(" ".join(map(repr, [k * 0.0369 + 0.25] + numbers)))
+    text(folder / "im_list.txt", "\n".join(times) + "\n")
+    text(folder / "groundtruth.txt", "\n".join(truth) + "\n")
+    camera = {"W": DEPTH[0], "H": DEPTH[1], "fx": focal[0], "fy": focal[1], "cx": centre[0], "cy": centre[1]}
+    axes = {f"extrinsic_Rb2w_q{axis}": q for axis, q in zip("wxyz", [0.5, -0.5, 0.5, -0.5])}
+    settings = {"dataset_type": "unreal", "dt_frame": 0.0369, "exposure_time": 0.0156288, **camera, **axes}
+    text(folder / "unreal.json", json.dumps({"Configuration": settings}, indent=1))
+
+
 def sens(path):
     intrinsic = lambda fx, fy, cx, cy: np.array([[fx, 0, cx, 0], [0, fy, cy, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     name = b"StructureSensor"
@@ -222,7 +259,7 @@ def r3d(path):
 
 if __name__ == "__main__":
     shutil.rmtree(HERE, ignore_errors=True)
-    for make in [seven_scenes, bundle_fusion, open3d, stray, stray_video, polycam, scanner_app, transforms, icl_nuim]:
+    for make in [seven_scenes, bundle_fusion, open3d, stray, stray_video, polycam, scanner_app, transforms, icl_nuim, mba_vo]:
         make(HERE / make.__name__)
     sens(HERE / "scene.sens")
     r3d(HERE / "recording.r3d")

@@ -215,6 +215,62 @@ fn icl_nuim() {
 }
 
 #[test]
+fn sequences_of_mba_vo() {
+    let brought = brought("mba_vo");
+    assert_eq!(brought.lines("rgb.txt")[1], "0.286900000 rgb/000001.png");
+    let calibration = brought.dataset.calibration();
+    assert_eq!((calibration.camera.fx, calibration.camera.cy), (7.0, 2.5));
+    assert_eq!((brought.dataset.exposure_seconds(1), calibration.readout), (0.0156288, Shutter::Global));
+    check_copies(&brought, &data("folders/mba_vo"), &[("rgb/000001.png", "rgb_blur/0008.png")]);
+    // Along the axis and in fifths of a millimetre; the sky has none.
+    for k in 0..2 {
+        let mut expected: Vec<u16> = depth(k, DEPTH).iter().map(|millimetres| 5 * millimetres).collect();
+        expected[0] = 0;
+        assert_eq!(brought.depth(&format!("depth/00000{k}.png")), expected);
+    }
+    // Poses are those of the camera.
+    check_poses(&brought, 2);
+    // A JPEG of the same picture: near it, as a PNG file of its name.
+    let (sharp, blurred) = (brought.rgb("sharp/000001.png"), brought.rgb("rgb/000001.png"));
+    let difference: f64 = sharp.iter().zip(&blurred).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+    assert!(difference / (sharp.len() as f64) < 12.0, "{difference}");
+    assert!(brought.imported.notes.is_empty(), "{:?}", brought.imported.notes);
+}
+
+#[test]
+fn what_sequences_of_mba_vo_lack_is_assumed_or_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("source");
+    for name in ["", "rgb_blur", "depth_sharp_middle"] {
+        fs::create_dir(source.join(name)).unwrap();
+        for file in fs::read_dir(data("folders/mba_vo").join(name)).unwrap() {
+            let path = file.unwrap().path();
+            if path.is_file() {
+                fs::copy(&path, source.join(name).join(path.file_name().unwrap())).unwrap();
+            }
+        }
+    }
+    // Without a list of times, images come as often as the configuration says.
+    fs::remove_file(source.join("im_list.txt")).unwrap();
+    let brought = bring(&source, &ImportOptions::default()).unwrap();
+    assert_eq!(brought.lines("rgb.txt")[0], "0.258300000 rgb/000000.png");
+    assert!(
+        brought.imported.notes[0].contains("one every 0.0369 s is assumed"),
+        "{:?}",
+        brought.imported.notes
+    );
+    let error = |source: &Path| bring(source, &ImportOptions::default()).err().unwrap().to_string();
+    fs::write(source.join("depth_sharp_middle/0008.depth"), "1 2 3").unwrap();
+    assert!(
+        error(&source).ends_with("0008.depth cannot be read: it has 3 numbers, not 8 x 6"),
+        "{}",
+        error(&source)
+    );
+    fs::write(source.join("im_list.txt"), "0007 0.25 0.3\n").unwrap();
+    assert!(error(&source).contains("im_list.txt, line 1"), "{}", error(&source));
+}
+
+#[test]
 fn a_data_set_is_not_written_into_its_source() {
     let folder = tempfile::tempdir().unwrap();
     let source = folder.path().join("source");

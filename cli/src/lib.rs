@@ -16,8 +16,9 @@ pub mod failure;
 pub mod interrupt;
 pub mod itself;
 pub mod progress;
-pub mod report;
 pub mod written_run;
+
+pub use mba_report as report;
 
 use args::{Cli, Command, EvalCommand, MOST_THREADS};
 use console::Console;

@@ -38,6 +38,14 @@ pub fn refuse<T>(error: OutputError) -> anyhow::Result<T> {
     Err(error).or_bad_input(hint)
 }
 
+/// The error of a report, with advice where it is the refusal of an output.
+///
+/// # Errors
+/// Always; as [`refuse`] where an output is refused.
+pub fn advise_report<T>(error: anyhow::Error) -> anyhow::Result<T> {
+    error.downcast().map_or_else(Err, refuse)
+}
+
 /// Advice for an output that is refused.
 #[must_use]
 pub fn output_hint(error: &OutputError) -> &'static str {

@@ -13,6 +13,7 @@ use crate::args::{Demo, Tracking};
 use crate::console::Console;
 use crate::interrupt::Resumption;
 use crate::report::{self, table};
+use crate::written_run::advise_report;
 
 /// Synthesises a blurred sequence, tracks it, maps it, prints the figures of the map and writes its charts and report.
 ///
@@ -30,7 +31,7 @@ pub fn run(args: &Demo, console: &Console) -> anyhow::Result<()> {
     track::track_into(&dataset, &tracked, how, interval, &Tracking::default(), console)?;
     let run = Run::open(&tracked)?;
     let summary = map::map_into(&dataset, &run, &mapped, how, &Mapping::default(), console)?;
-    let path = report::write(&Run::open(&mapped)?, Some(&dataset), false)?;
+    let path = report::write(&Run::open(&mapped)?, Some(&dataset), false).or_else(advise_report)?;
     console.result(&summary, table::summary)?;
     console.note(format!("open {} in a browser", path.display()));
     Ok(())

@@ -6,6 +6,7 @@ use super::open;
 use crate::args::Report;
 use crate::console::Console;
 use crate::report;
+use crate::written_run::advise_report;
 
 /// What is printed.
 #[derive(Serialize)]
@@ -20,7 +21,7 @@ struct Written {
 pub fn run(args: &Report, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
     let dataset = open::dataset_if_there(&run, args.dataset.as_deref(), console)?;
-    let path = report::write(&run, dataset.as_ref(), args.force)?;
+    let path = report::write(&run, dataset.as_ref(), args.force).or_else(advise_report)?;
     console.result(&Written { report: path.display().to_string() }, |written| {
         format!("wrote {}", written.report)
     })

@@ -11,6 +11,7 @@ use crate::args::View;
 use crate::console::Console;
 use crate::failure::bad_input;
 use crate::report;
+use crate::written_run::advise_report;
 
 /// What is printed.
 #[derive(Serialize)]
@@ -33,7 +34,8 @@ pub fn run(args: &View, console: &Console) -> anyhow::Result<()> {
         return Err(bad_input(format!("{folder} does not tell its camera"), "make the run again"));
     };
     let dataset = open::dataset_if_there(&run, args.dataset.as_deref(), console)?;
-    let page = report::write_view(&run, (&map, camera), dataset.as_ref(), args.force)?;
+    let page =
+        report::write_view(&run, (&map, camera), dataset.as_ref(), args.force).or_else(advise_report)?;
     if !args.no_open && !open_in_browser(&page) {
         console.note(format!("open {} in a browser", page.display()));
     }

@@ -24,8 +24,6 @@ use mba_mapper::gaussians::Gaussians;
 use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::run::{Run, RunCamera};
 
-use crate::written_run::refuse;
-
 pub use plots::{Plot, plots};
 pub use view::RunView;
 
@@ -46,7 +44,8 @@ const CHART_START: &str = "<svg style=\"background: white; color: black\" ";
 /// path.
 ///
 /// # Errors
-/// When a file cannot be written or a chart or picture cannot be made.
+/// [`OutputError`](mba_mapper::output::OutputError) when a file may not be written; else when it cannot be, or a chart or
+/// picture cannot be made.
 pub fn write(run: &Run, dataset: Option<&Dataset>, force: bool) -> anyhow::Result<PathBuf> {
     let plots = plots(run, &RunView::new(run, dataset))?;
     let keyframes = pictures::keyframe_images(run, dataset);
@@ -76,7 +75,7 @@ pub fn write(run: &Run, dataset: Option<&Dataset>, force: bool) -> anyhow::Resul
 /// others. Returns its path.
 ///
 /// # Errors
-/// When the file cannot be written or a picture cannot be made.
+/// As [`write()`].
 pub fn write_view(
     run: &Run,
     map: (&Gaussians, &RunCamera),
@@ -90,7 +89,7 @@ pub fn write_view(
 }
 
 fn claim(path: &Path, force: bool, is_own: impl Fn(&[u8]) -> bool) -> anyhow::Result<OutputFile> {
-    OutputFile::claim(path, &Permission { force, inputs: &[] }, is_own).or_else(refuse)
+    Ok(OutputFile::claim(path, &Permission { force, inputs: &[] }, is_own)?)
 }
 
 /// Claims files of a folder that is made for them; without files there is no folder.

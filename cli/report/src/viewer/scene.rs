@@ -10,15 +10,15 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::pack::{COLOURS, SCALES};
-use crate::report::pictures::jpeg_base64;
+use crate::pictures::jpeg_base64;
 
 /// How much of a run a page shows.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::report) struct Extent {
+pub(crate) struct Extent {
     /// Most keyframes, evenly chosen.
-    pub(in crate::report) keyframes: usize,
+    pub(crate) keyframes: usize,
     /// Columns that their pictures are reduced to.
-    pub(in crate::report) columns: u32,
+    pub(crate) columns: u32,
 }
 
 /// Knots of the curve from light to display values, at the squares of even steps.

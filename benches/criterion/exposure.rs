@@ -18,15 +18,14 @@ fn exposures(c: &mut Criterion) {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads start");
             let size = format!("{views} on {threads}");
             group.bench_function(BenchmarkId::new("forward", &size), |b| {
-                pool.install(|| b.iter(|| input.forward(views)));
-            });
-            group.bench_function(BenchmarkId::new("forward+backward", &size), |b| {
                 pool.install(|| {
                     b.iter(|| {
                         input.forward(views);
-                        input.backward()
                     });
                 });
+            });
+            group.bench_function(BenchmarkId::new("forward+backward", &size), |b| {
+                pool.install(|| b.iter(|| input.forward_backward(views)));
             });
         }
     }

@@ -55,12 +55,7 @@ fn passes(c: &mut Criterion) {
                 with_threads(threads, || b.iter(|| input.forward()));
             });
             group.bench_function(BenchmarkId::new("forward+backward", &size), |b| {
-                with_threads(threads, || {
-                    b.iter(|| {
-                        input.forward();
-                        input.backward();
-                    });
-                });
+                with_threads(threads, || b.iter(|| input.forward_backward()));
             });
         }
     }

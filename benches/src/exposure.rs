@@ -1,6 +1,6 @@
 //! The furnished room, seen by a camera that moves while its shutter is open.
 
-use mba_mapper::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, PATH_PARAMETERS};
+use mba_mapper::exposure::{ExposurePath, ExposureRenderer, ExposureScratch, ExposureTape, PATH_PARAMETERS};
 use mba_mapper::raster::RasterImage;
 use mba_tracker::simd::Level;
 use mba_tracker::trajectory::ExposureTrajectory;
@@ -38,16 +38,19 @@ impl ExposureInput {
         }
     }
 
-    /// Renders the exposure.
-    pub fn forward(&mut self, views: usize) {
+    /// Renders the exposure. What is returned takes the gradient back to map and path.
+    pub fn forward(&mut self, views: usize) -> ExposureTape<'_> {
         let Self { room, path, renderer, scratch, image } = self;
         let background = room.view.background;
-        renderer.forward(&room.gaussians, &room.view.camera, path, views, background, scratch, image);
+        renderer.forward(&room.gaussians, &room.view.camera, path, views, background, scratch, image)
     }
 
-    /// Takes the gradient back to map and path.
-    pub fn backward(&mut self) -> SVector<f64, PATH_PARAMETERS> {
-        let RasterInput { gaussians, grad_image, gradients, .. } = &mut self.room;
-        self.renderer.backward(gaussians, grad_image, &mut self.scratch, gradients)
+    /// Renders the exposure and takes the gradient back to map and path.
+    pub fn forward_backward(&mut self, views: usize) -> SVector<f64, PATH_PARAMETERS> {
+        let Self { room, path, renderer, scratch, image } = self;
+        let RasterInput { gaussians, view, grad_image, gradients, .. } = room;
+        renderer
+            .forward(gaussians, &view.camera, path, views, view.background, scratch, image)
+            .backward(grad_image, gradients)
     }
 }

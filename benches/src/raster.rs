@@ -90,8 +90,7 @@ impl RasterInput {
             view,
             grad_image,
         };
-        input.forward();
-        input.backward();
+        input.forward_backward();
         input
     }
 
@@ -100,10 +99,10 @@ impl RasterInput {
         self.rasterizer.forward(&self.gaussians, &self.view, &mut self.scratch, &mut self.image);
     }
 
-    /// Takes the gradient back to map and pose.
-    pub fn backward(&mut self) {
-        let Self { rasterizer, gaussians, grad_image, scratch, gradients, .. } = self;
-        rasterizer.backward(gaussians, grad_image, scratch, gradients);
+    /// Renders the view and takes the gradient back to map and pose.
+    pub fn forward_backward(&mut self) {
+        let Self { rasterizer, gaussians, view, grad_image, scratch, image, gradients } = self;
+        rasterizer.forward(gaussians, view, scratch, image).backward(grad_image, gradients);
     }
 }
 

@@ -31,8 +31,8 @@ impl Rendered {
         let mut scratch = RasterScratch::default();
         let mut image = RasterImage::default();
         let mut gradients = GaussianGradients::zeros(gaussians.len());
-        rasterizer.forward(gaussians, view, &mut scratch, &mut image);
-        let view = rasterizer.backward(gaussians, grad_image, &mut scratch, &mut gradients);
+        let mut tape = rasterizer.forward(gaussians, view, &mut scratch, &mut image);
+        let view = tape.backward(grad_image, &mut gradients);
         let contributions = rasterizer.contributions(&mut scratch);
         Self { image, gradients, view, contributions }
     }

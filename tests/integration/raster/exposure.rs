@@ -55,10 +55,11 @@ impl Scene {
         let renderer = ExposureRenderer::new(Level::new());
         let (mut scratch, mut image) = (ExposureScratch::default(), RasterImage::default());
         let RasterView { camera, background, .. } = &self.view;
-        renderer.forward(&self.gaussians, camera, &self.path, views, *background, &mut scratch, &mut image);
+        let (map, path) = (&self.gaussians, &self.path);
+        let mut tape = renderer.forward(map, camera, path, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(self.gaussians.len());
         let grad_image = to_image(&self.view, &self.grad_pixels);
-        let grad_path = renderer.backward(&self.gaussians, &grad_image, &mut scratch, &mut gradients);
+        let grad_path = tape.backward(&grad_image, &mut gradients);
         Exposed { image, gradients, grad_path, drawn: scratch.drawn_mask().to_vec() }
     }
 
@@ -254,10 +255,11 @@ fn used_memory_does_not_matter() {
     for (seed, width, count, views) in [(1, 131, 900, 5), (2, 40, 17, 1), (3, 90, 800, 7), (4, 40, 0, 3)] {
         let scene = Scene::new(seed, [width, 50], count);
         let RasterView { camera, background, .. } = &scene.view;
-        renderer.forward(&scene.gaussians, camera, &scene.path, views, *background, &mut scratch, &mut image);
+        let (map, path) = (&scene.gaussians, &scene.path);
+        let mut tape = renderer.forward(map, camera, path, views, *background, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(count);
         let grad_image = to_image(&scene.view, &scene.grad_pixels);
-        let grad_path = renderer.backward(&scene.gaussians, &grad_image, &mut scratch, &mut gradients);
+        let grad_path = tape.backward(&grad_image, &mut gradients);
         let fresh = scene.exposed(views);
         assert!(
             image == fresh.image && gradients == fresh.gradients && grad_path == fresh.grad_path,
@@ -288,7 +290,7 @@ fn images_of_another_size_are_refused() {
     let renderer = ExposureRenderer::new(Level::new());
     let (mut scratch, mut image) = (ExposureScratch::default(), RasterImage::default());
     let RasterView { camera, background, .. } = &scene.view;
-    renderer.forward(&scene.gaussians, camera, &scene.path, 3, *background, &mut scratch, &mut image);
-    let mut gradients = GaussianGradients::zeros(20);
-    renderer.backward(&scene.gaussians, &RasterImage::zeros(40, 60), &mut scratch, &mut gradients);
+    let (map, path) = (&scene.gaussians, &scene.path);
+    let mut tape = renderer.forward(map, camera, path, 3, *background, &mut scratch, &mut image);
+    tape.backward(&RasterImage::zeros(40, 60), &mut GaussianGradients::zeros(20));
 }

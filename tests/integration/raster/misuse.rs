@@ -1,6 +1,5 @@
 //! Wrong sizes and states are refused with a message, never answered with zeros.
 
-use mba_mapper::exposure::{ExposureRenderer, ExposureScratch};
 use mba_mapper::gaussians::{ForViewers, Gaussian, Gaussians, format_ply_for_viewers};
 use mba_mapper::raster::{GaussianGradients, RasterImage, RasterScratch, RasterView, Rasterizer};
 use mba_tests::raster_scene::{random_gaussians, random_view, to_parameters};
@@ -18,9 +17,8 @@ fn backward([width, height]: [usize; 2], count: usize) {
     let (gaussians, view) = scene();
     let rasterizer = Rasterizer::new(Level::new());
     let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
-    rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
-    let mut gradients = GaussianGradients::zeros(count);
-    rasterizer.backward(&gaussians, &RasterImage::zeros(width, height), &mut scratch, &mut gradients);
+    let mut tape = rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
+    tape.backward(&RasterImage::zeros(width, height), &mut GaussianGradients::zeros(count));
 }
 
 #[test]
@@ -38,20 +36,6 @@ fn an_image_of_another_size_is_refused() {
 #[should_panic(expected = "the size of the view that was rendered before")]
 fn gradients_of_another_map_are_refused() {
     backward([60, 90], 19);
-}
-
-#[test]
-#[should_panic(expected = "none was rendered before")]
-fn an_exposure_goes_backward_only_after_it_went_forward() {
-    let (gaussians, _) = scene();
-    let mut gradients = GaussianGradients::zeros(20);
-    let renderer = ExposureRenderer::new(Level::new());
-    renderer.backward(
-        &gaussians,
-        &RasterImage::zeros(60, 90),
-        &mut ExposureScratch::default(),
-        &mut gradients,
-    );
 }
 
 #[test]

@@ -60,10 +60,11 @@ impl Scene {
         let (mut scratch, mut image) = (ExposureScratch::default(), RasterImage::default());
         let RasterView { camera, background, .. } = &self.view;
         let (map, path) = (&self.gaussians, &self.path);
-        renderer.forward_rows(map, camera, path, times, views, *background, &mut scratch, &mut image);
+        let (scratch, target) = (&mut scratch, &mut image);
+        let mut tape = renderer.forward_rows(map, camera, path, times, views, *background, scratch, target);
         let mut gradients = GaussianGradients::zeros(map.len());
         let grad_image = to_image(&self.view, &self.grad_pixels);
-        let grad_path = renderer.backward(map, &grad_image, &mut scratch, &mut gradients);
+        let grad_path = tape.backward(&grad_image, &mut gradients);
         Exposed { image, gradients, grad_path }
     }
 
@@ -148,10 +149,11 @@ fn one_exposure_for_all_rows_is_the_same_bit_for_bit() {
         &mut scratch,
         &mut image,
     );
-    renderer.forward(&scene.gaussians, camera, &scene.path, 5, *background, &mut scratch, &mut image);
+    let (map, path) = (&scene.gaussians, &scene.path);
+    let mut tape = renderer.forward(map, camera, path, 5, *background, &mut scratch, &mut image);
     let mut gradients = GaussianGradients::zeros(COUNT);
     let grad_image = to_image(&scene.view, &scene.grad_pixels);
-    let grad_path = renderer.backward(&scene.gaussians, &grad_image, &mut scratch, &mut gradients);
+    let grad_path = tape.backward(&grad_image, &mut gradients);
     assert!(image == rows.image && gradients == rows.gradients && grad_path == rows.grad_path);
 }
 

@@ -38,9 +38,9 @@ fn used_memory_does_not_matter() {
     let mut image = RasterImage::default();
     for (seed, width, count) in [(1, 131, 3000), (2, 40, 17), (3, 90, 800), (4, 40, 0)] {
         let (gaussians, view, grad_image) = scene(seed, width, count);
-        rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
+        let mut tape = rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
         let mut gradients = GaussianGradients::zeros(count);
-        let grad_view = rasterizer.backward(&gaussians, &grad_image, &mut scratch, &mut gradients);
+        let grad_view = tape.backward(&grad_image, &mut gradients);
         let fresh = Rendered::new(Level::new(), &gaussians, &view, &grad_image);
         assert!(
             image == fresh.image && gradients == fresh.gradients && grad_view == fresh.view,
@@ -54,11 +54,11 @@ fn gradients_add_up() {
     let (gaussians, view, grad_image) = scene(5, 60, 100);
     let rasterizer = Rasterizer::new(Level::new());
     let (mut scratch, mut image) = (RasterScratch::default(), RasterImage::default());
-    rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
+    let mut tape = rasterizer.forward(&gaussians, &view, &mut scratch, &mut image);
     let mut twice = GaussianGradients::zeros(100);
-    rasterizer.backward(&gaussians, &grad_image, &mut scratch, &mut twice);
+    tape.backward(&grad_image, &mut twice);
     let once = twice.clone();
-    rasterizer.backward(&gaussians, &grad_image, &mut scratch, &mut twice);
+    tape.backward(&grad_image, &mut twice);
     for (once, twice) in once.parameters.planes().iter().zip(twice.parameters.planes()) {
         assert!(once.iter().zip(twice).all(|(once, twice)| 2.0 * once == *twice), "gradients are not added");
     }

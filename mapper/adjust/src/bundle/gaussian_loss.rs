@@ -1,6 +1,6 @@
 //! The loss of one exposure and all its gradients.
 
-use mba_raster::exposure::{ExposureRenderer, ExposureScratch};
+use mba_raster::exposure::{ExposureRenderer, ExposureScratch, ExposureTape};
 use mba_raster::gaussians::Gaussians;
 use mba_raster::losses::{DisplayPlanes, Exposure, ExposureLoss, Ssim, compare_depth};
 use mba_raster::raster::{GaussianGradients, RasterImage};
@@ -47,39 +47,28 @@ impl GaussianLoss {
         plan: &StepPlan,
     ) -> ExposureLoss {
         // Forward: the mean of virtual views, then display values beside the captured ones.
-        self.render(gaussians, exposure);
+        let Self { curve, renderer, scratch, image, grad_image, planes, ssim, gradients } = self;
+        let mut tape = rendered(renderer, gaussians, exposure, scratch, image);
         let Exposure { seen, gain, .. } = exposure;
         let (camera, gain) = (&seen.camera, gain as f32);
-        let (scratch, image) = (&mut self.scratch, &mut self.image);
-        let mut terms = self.planes.compare(&self.curve, gain, image, seen, plan.weights.colour);
+        let mut terms = planes.compare(curve, gain, image, seen, plan.weights.colour);
         if plan.weights.similarity > 0.0 {
             let size = [camera.width, camera.height];
-            terms.similarity = self.planes.add_similarity(&mut self.ssim, size, plan.weights.similarity);
+            terms.similarity = planes.add_similarity(ssim, size, plan.weights.similarity);
         }
-        self.grad_image.resize(camera.width, camera.height);
+        grad_image.resize(camera.width, camera.height);
         // Backward: from display values to light, from light to Gaussians and path.
-        let grad_log_gain = self.planes.gradient_by_light(image, &mut self.grad_image);
-        terms.depth = compare_depth(image, seen, &plan.weights, &mut self.grad_image);
-        self.gradients.reset(gaussians.len());
-        let grad_path = self.renderer.backward(gaussians, &self.grad_image, scratch, &mut self.gradients);
+        let grad_log_gain = planes.gradient_by_light(image, grad_image);
+        terms.depth = compare_depth(image, seen, &plan.weights, grad_image);
+        gradients.reset(gaussians.len());
+        let grad_path = tape.backward(grad_image, gradients);
         ExposureLoss { terms, grad_path, grad_log_gain }
     }
 
     /// The picture of `exposure`, in linear light before the lens and the gain; the loss and its gradients are forgotten.
     pub fn render(&mut self, gaussians: &Gaussians, exposure: Exposure<'_>) -> &RasterImage {
-        let Exposure { seen, path, views, .. } = exposure;
-        let (scratch, image) = (&mut self.scratch, &mut self.image);
-        self.renderer.forward_rows(
-            gaussians,
-            &seen.camera,
-            path,
-            &seen.times,
-            views,
-            [0.0; 3],
-            scratch,
-            image,
-        );
-        image
+        rendered(&self.renderer, gaussians, exposure, &mut self.scratch, &mut self.image);
+        &self.image
     }
 
     /// Gradients by the map of the last exposure.
@@ -93,4 +82,16 @@ impl GaussianLoss {
     pub fn drawn(&self) -> &[bool] {
         self.scratch.drawn_mask()
     }
+}
+
+/// Renders `exposure` into `image`.
+fn rendered<'a>(
+    renderer: &ExposureRenderer,
+    gaussians: &'a Gaussians,
+    exposure: Exposure<'_>,
+    scratch: &'a mut ExposureScratch,
+    image: &mut RasterImage,
+) -> ExposureTape<'a> {
+    let Exposure { seen, path, views, .. } = exposure;
+    renderer.forward_rows(gaussians, &seen.camera, path, &seen.times, views, [0.0; 3], scratch, image)
 }

@@ -62,11 +62,11 @@ impl Blending {
         self.gradients.reset(self.painted.len());
         let Self { rasterizer, painted, scratch, image, gradients, .. } = self;
         for (k, pose) in self.poses.iter().enumerate() {
-            rasterizer.forward(painted, &view(self.camera, pose), scratch, image);
+            let mut tape = rasterizer.forward(painted, &view(self.camera, pose), scratch, image);
             change(k, &mut image.colour);
             image.depth.fill(0.0);
             image.alpha.fill(0.0);
-            rasterizer.backward(painted, image, scratch, gradients);
+            tape.backward(image, gradients);
         }
         let planes = &gradients.parameters.planes()[COLOUR..];
         core::array::from_fn(|channel| planes[channel].clone())

@@ -10,10 +10,12 @@ mod path;
 mod renderer;
 mod rows;
 mod scratch;
+mod tape;
 mod timing;
 
 pub use blur::{blur_length, motion_of};
 pub use path::{ExposurePath, PATH_PARAMETERS};
 pub use renderer::ExposureRenderer;
 pub use scratch::ExposureScratch;
+pub use tape::ExposureTape;
 pub use timing::{RowTimes, RowTiming};

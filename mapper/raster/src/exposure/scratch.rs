@@ -1,9 +1,10 @@
 //! Memory of the virtual views.
 
 use mba_tracker::geometry::RigidTransform;
-use nalgebra::SMatrix;
+use nalgebra::{SMatrix, SVector};
 
-use super::path::PATH_PARAMETERS;
+use super::path::{ExposurePath, PATH_PARAMETERS};
+use crate::raster::pose::ViewGradient;
 use crate::raster::{PoseSums, RasterScratch};
 
 /// Everything that rendering an exposure leaves for its backward pass; reused from exposure to exposure, so that
@@ -29,6 +30,18 @@ pub(super) struct VirtualPose {
     pub(super) world_from_camera: RigidTransform,
     /// Its derivative by the parameters of the path.
     pub(super) grad_path: SMatrix<f64, 6, PATH_PARAMETERS>,
+}
+
+impl VirtualPose {
+    /// The pose on the path at `time`.
+    pub(super) fn new(path: &ExposurePath, time: f64) -> Self {
+        Self { world_from_camera: path.at(time), grad_path: path.pose_jacobian(time) }
+    }
+
+    /// The gradient by the parameters of the path.
+    pub(super) fn grad_path(&self, grad_view: &ViewGradient) -> SVector<f64, PATH_PARAMETERS> {
+        self.grad_path.transpose() * grad_view.tangent(&self.world_from_camera)
+    }
 }
 
 impl ExposureScratch {

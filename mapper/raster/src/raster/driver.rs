@@ -16,6 +16,7 @@ use super::order::{NO_RANK, Order};
 use super::pose::ViewGradient;
 use super::project::{Projected, project};
 use super::project_backward::{GradientRange, SplatGradients, ViewSums, project_backward};
+use super::tape::ViewTape;
 use super::tile::TileGrid;
 use super::view::RasterView;
 use super::view_share::ViewShare;
@@ -96,12 +97,10 @@ impl RasterScratch {
         self.order.len()
     }
 
-    /// Whether Gaussians, an image and gradients have the sizes of the last view.
-    pub fn fits(&self, gaussians: &Gaussians, image: &RasterImage, gradients: &GaussianGradients) -> bool {
-        let same_image = [image.width, image.height] == self.size;
-        same_image
-            && gaussians.len() == self.order.rank_from_gaussian.len()
-            && gradients.screen.len() == gaussians.len()
+    /// Whether an image and gradients have the sizes of the last view.
+    pub(crate) fn fits(&self, image: &RasterImage, gradients: &GaussianGradients) -> bool {
+        [image.width, image.height] == self.size
+            && gradients.screen.len() == self.order.rank_from_gaussian.len()
     }
 
     fn splat_gradients<'a>(&'a self, planes: &'a [&'a [f32]; PARAMETERS]) -> SplatGradients<'a> {
@@ -128,19 +127,20 @@ impl Rasterizer {
         Self { level }
     }
 
-    /// Renders a view into `image`, which gets its size.
+    /// Renders a view into `image`, which gets its size. What is returned takes gradients back.
     ///
     /// Gaussians are left out if they are behind the camera or nearer than 1 cm, fainter than a step of 8 bits,
     /// outside of the image, or have a parameter that is not finite or without meaning.
-    pub fn forward(
+    pub fn forward<'a>(
         &self,
-        gaussians: &Gaussians,
+        gaussians: &'a Gaussians,
         view: &RasterView,
-        scratch: &mut RasterScratch,
+        scratch: &'a mut RasterScratch,
         image: &mut RasterImage,
-    ) {
+    ) -> ViewTape<'a> {
         self.render(gaussians, view, true, scratch);
         self.store_image(scratch, image);
+        ViewTape { rasterizer: *self, gaussians, scratch }
     }
 
     /// All of [`Self::forward`] but the image. Without `geometry` depth is left out.
@@ -187,27 +187,6 @@ impl Rasterizer {
         } else {
             self.composite_tiles::<false>(scratch);
         }
-    }
-
-    /// Adds the gradients of a loss to `gradients`, which has the length of `gaussians`, and returns the gradient
-    /// by the pose. `grad_image` is the gradient by the image of the last call of [`Self::forward`], which had the
-    /// same Gaussians and the same scratch memory.
-    ///
-    /// # Panics
-    /// If Gaussians, image or gradients have other sizes than in that call.
-    pub fn backward(
-        &self,
-        gaussians: &Gaussians,
-        grad_image: &RasterImage,
-        scratch: &mut RasterScratch,
-        gradients: &mut GaussianGradients,
-    ) -> ViewGradient {
-        assert!(
-            scratch.fits(gaussians, grad_image, gradients),
-            "backward is for the Gaussians and the size of the view that was rendered before"
-        );
-        self.replay(grad_image, scratch);
-        self.project_backward(gaussians, scratch, gradients)
     }
 
     /// Number of Gaussians composited at every pixel of the last view, row by row.
@@ -300,7 +279,7 @@ impl Rasterizer {
         });
     }
 
-    /// First stage of [`Self::backward`], of which the conditions hold: sums of every splat over every tile.
+    /// First stage of [`ViewTape::backward`], of which the conditions hold: sums of every splat over every tile.
     pub fn replay(&self, grad_image: &RasterImage, scratch: &mut RasterScratch) {
         self.replay_share(grad_image, ViewShare::WHOLE, scratch);
     }
@@ -342,7 +321,7 @@ impl Rasterizer {
         }
     }
 
-    /// Last stage of [`Self::backward`], of which the conditions hold: sums over tiles, back to the parameters.
+    /// Last stage of [`ViewTape::backward`], of which the conditions hold: sums over tiles, back to the parameters.
     pub fn project_backward(
         &self,
         gaussians: &Gaussians,
@@ -483,9 +462,9 @@ mod tests {
         // Gradients find both views as they were rendered.
         let mut gradients = GaussianGradients::zeros(gaussians.len());
         image.colour[0].fill(1.0);
-        scratch.iter_mut().for_each(|scratch| {
-            rasterizer.backward(&gaussians, &image, scratch, &mut gradients);
-        });
+        for scratch in &mut scratch {
+            ViewTape { rasterizer, gaussians: &gaussians, scratch }.backward(&image, &mut gradients);
+        }
         assert_ne!(gradients.parameters.get(7), gradients.parameters.get(8));
     }
 }

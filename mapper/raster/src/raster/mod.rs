@@ -8,7 +8,7 @@
 //! al. 2024), linear in the offset from its projected centre. With the depth of the centres, overlapping splats of a
 //! slanted surface would be composited nearer than that surface, because the nearer centre is in front.
 //!
-//! Stages, one file each: [`Rasterizer::forward`] projects, orders, bins and composites; [`Rasterizer::backward`]
+//! Stages, one file each: [`Rasterizer::forward`] projects, orders, bins and composites; [`ViewTape::backward`]
 //! replays the pixels, reduces over tiles and projects back. Only the drivers know about threads; the results do not
 //! depend on their number. [`mod@reference`] is the slow oracle.
 
@@ -28,6 +28,7 @@ mod project;
 mod project_backward;
 mod reduce;
 pub mod reference;
+mod tape;
 mod tile;
 mod view;
 mod view_share;
@@ -36,6 +37,7 @@ pub(crate) use bands::BandView;
 pub(crate) use driver::PoseSums;
 pub use driver::{GaussianGradients, RasterScratch, Rasterizer};
 pub use image::RasterImage;
+pub use tape::ViewTape;
 pub(crate) use tile::TILE_HEIGHT;
 pub use view::RasterView;
 pub(crate) use view_share::{ColourShare, ViewShare};

@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let settings = RunSettings::new("small_map", &dataset);
     let mut writer = RunWriter::create_in(&tracked, settings.clone())?;
     track_dataset(&dataset, &TrackingOptions::default(), &mut writer, |_| ControlFlow::Continue(()))?;
-    let trajectory = Merit::of(writer.exposures(), &dataset).trajectory;
+    let trajectory = Merit::of(writer.record().exposures(), &dataset).trajectory;
     writer.finish(|summary| summary.trajectory.clone_from(&trajectory))?;
     let run = Run::open(&tracked)?;
 

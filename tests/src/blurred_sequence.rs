@@ -105,10 +105,15 @@ impl BlurredSequence {
         let tracked =
             track_and_keep(&self.dataset, &options, &mut writer, None, |_| go_on()).expect("tracked");
         let error = |writer: &RunWriter| {
-            Merit::of(writer.exposures(), &self.dataset).trajectory.expect("a true trajectory").ate_m.rmse
+            Merit::of(writer.record().exposures(), &self.dataset)
+                .trajectory
+                .expect("a true trajectory")
+                .ate_m
+                .rmse
         };
         let before = error(&writer);
-        look_back(&self.dataset, &options, &mut writer, &tracked.measured, go_on).expect("looked back");
+        look_back(&self.dataset, &options, writer.record_mut(), &tracked.measured, go_on)
+            .expect("looked back");
         [before, error(&writer)]
     }
 

@@ -50,7 +50,7 @@ fn localise_into(
     let folder = claim(&args.out, args.force, &[dataset.folder(), &run.folder])?;
     let describe = written_run::settings(dataset, &json!({ "map": absolute(&run.folder) }));
     let mut writer = RunWriter::create(folder, describe)?;
-    dataset.warnings().iter().for_each(|warning| writer.warn(warning.to_string()));
+    dataset.warnings().iter().for_each(|warning| writer.record_mut().warn(warning.to_string()));
     let progress = console.progress(dataset.len(), "localising");
     let mut known = KnownMap::new(map.into(), run, dataset, config);
     let localised = localise(dataset, config, &mut known, &mut writer, || {
@@ -60,13 +60,13 @@ fn localise_into(
     progress.finish_and_clear();
     let figures = match localised {
         Err(LocaliseError::Stopped) => {
-            let (frames, all) = (writer.frames().len(), dataset.len());
+            let (frames, all) = (writer.record().frames().len(), dataset.len());
             let message = format!("stopped after {frames} of {all} frames");
             return Err(interrupted(message, Resumption::Never.advice()));
         }
         other => other?,
     };
-    if outcome::nothing_tracked(writer.frames()) {
+    if outcome::nothing_tracked(writer.record().frames()) {
         if writer.has_earlier() {
             writer.give_up();
         }
@@ -78,12 +78,13 @@ fn localise_into(
         ));
     }
     if let Some(upright) = run.summary.upright {
-        writer.set_upright(upright);
+        writer.record_mut().set_upright(upright);
     }
     writer.replace_earlier()?;
     calibrate::keep(dataset, &args.out)?;
-    let merit = Merit::of(writer.exposures(), dataset);
-    let plausibility = plausibility(writer.exposures(), writer.frames(), dataset);
+    let track = writer.record();
+    let merit = Merit::of(track.exposures(), dataset);
+    let plausibility = plausibility(track.exposures(), track.frames(), dataset);
     let summary = writer.finish(|summary| {
         summary.localisation = Some(figures);
         summary.plausibility = plausibility;

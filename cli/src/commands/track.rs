@@ -7,7 +7,7 @@ use std::time::Duration;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::hindsight::look_back;
 use mba_mapper::run::{
-    Merit, RunError, RunSettings, RunWriter, Summary, plausibility, write_deblurred_keyframes,
+    Merit, RunError, RunSettings, RunWriter, Summary, TrackRecord, plausibility, write_deblurred_keyframes,
 };
 use mba_mapper::self_calibration::{contradictions, depth_lag_of_tracked};
 use mba_mapper::tracking::{
@@ -63,7 +63,7 @@ pub fn track_into(
         console.warning(warning.to_string());
         // Those of a run that goes on have been noted.
         if checkpoint.frames() == 0 {
-            writer.warn(warning.to_string());
+            writer.record_mut().warn(warning.to_string());
         }
     }
     let progress = console.progress(dataset.len(), "tracking");
@@ -91,16 +91,17 @@ pub fn track_into(
             }
             if let Some(lag) = depth_lag_of_tracked(dataset, tracked.disagreement) {
                 console.warning(lag.to_string());
-                writer.warn(lag.to_string());
+                writer.record_mut().warn(lag.to_string());
             }
         }
     }
-    for found in contradictions(dataset, writer.exposures(), writer.frames()) {
+    let track = writer.record();
+    for found in contradictions(dataset, track.exposures(), track.frames()) {
         console.warning(found.to_string());
-        writer.warn(found.to_string());
+        writer.record_mut().warn(found.to_string());
     }
-    stand_upright(dataset, args.up, &mut writer);
-    if outcome::nothing_tracked(writer.frames()) && writer.has_earlier() {
+    stand_upright(dataset, args.up, writer.record_mut());
+    if outcome::nothing_tracked(writer.record().frames()) && writer.has_earlier() {
         writer.give_up();
         return Err(outcome::failure(dataset, "; the earlier run in the folder stays"));
     }
@@ -109,8 +110,9 @@ pub fn track_into(
     if args.keyframes == Switch::On && deblur_keyframes(dataset, args, &mut writer, console)?.is_break() {
         return Err(stopped(dataset, out, &writer, resumption));
     }
-    let merit = Merit::of(writer.exposures(), dataset);
-    let plausibility = plausibility(writer.exposures(), writer.frames(), dataset);
+    let track = writer.record();
+    let merit = Merit::of(track.exposures(), dataset);
+    let plausibility = plausibility(track.exposures(), track.frames(), dataset);
     let summary = writer.finish(|summary| {
         summary.plausibility = plausibility;
         summary.trajectory = merit.trajectory;
@@ -135,7 +137,7 @@ fn look_back_with_progress(
     console: &Console,
 ) -> Result<(), TrackingError> {
     let progress = console.progress(dataset.len(), "looking back");
-    let looked_back = look_back(dataset, options, writer, &tracked.measured, || {
+    let looked_back = look_back(dataset, options, writer.record_mut(), &tracked.measured, || {
         progress.inc(1);
         interrupt::flow()
     });
@@ -143,13 +145,12 @@ fn look_back_with_progress(
     looked_back
 }
 
-/// Moves the run into a world whose z axis points up, if it is known where that is.
-fn stand_upright(dataset: &Dataset, up_in_first_camera: Option<UnitVector3<f64>>, writer: &mut RunWriter) {
-    let (exposures, records) = (writer.exposures(), writer.frames());
-    let upright = upright_world(dataset, exposures, records, up_in_first_camera);
+/// Moves the poses into a world whose z axis points up, if it is known where that is.
+fn stand_upright(dataset: &Dataset, up_in_first_camera: Option<UnitVector3<f64>>, track: &mut TrackRecord) {
+    let upright = upright_world(dataset, track.exposures(), track.frames(), up_in_first_camera);
     if let Some((upright_from_world, how)) = upright {
-        writer.move_world(|_| upright_from_world);
-        writer.set_upright(how);
+        track.move_world(|_| upright_from_world);
+        track.set_upright(how);
     }
 }
 
@@ -160,7 +161,7 @@ fn deblur_keyframes(
     console: &Console,
 ) -> Result<ControlFlow<()>, RunError> {
     let config = tracker_config(dataset, &TrackingOptions::from(args));
-    let progress = console.progress(writer.keyframes().len(), "deblurring");
+    let progress = console.progress(writer.record().keyframes().len(), "deblurring");
     let written = write_deblurred_keyframes(dataset, &config, writer, || {
         progress.inc(1);
         interrupt::flow()
@@ -183,7 +184,7 @@ fn settings(dataset: &Dataset, args: &Tracking) -> RunSettings {
 }
 
 fn stopped(dataset: &Dataset, out: &Path, writer: &RunWriter, resumption: Resumption) -> anyhow::Error {
-    let (frames, all) = (writer.frames().len(), dataset.len());
+    let (frames, all) = (writer.record().frames().len(), dataset.len());
     let message = if writer.has_earlier() {
         format!("stopped after {frames} of {all} frames; {} still holds the earlier run", out.display())
     } else {

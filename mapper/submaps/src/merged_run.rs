@@ -41,11 +41,11 @@ impl MergedRun<'_> {
         // All poses are known: an earlier run may go before large files are written.
         writer.replace_earlier()?;
         writer.write_map(map)?;
-        let keyframes: Vec<usize> = writer.keyframes().into_iter().map(|(index, _)| index).collect();
+        let keyframes: Vec<usize> = writer.record().keyframes().into_iter().map(|(index, _)| index).collect();
         for &index in &keyframes {
             writer.copy_images(&self.job.group_folder(self.job.plan.owner(index)), index)?;
         }
-        let exposures = writer.exposures().to_vec();
+        let exposures = writer.record().exposures().to_vec();
         let pictures = picture_figures(self.dataset, map, &keyframes, writer.folder(), &exposures);
         let figures = MapFigures {
             gaussians: figures.gaussians,
@@ -75,7 +75,9 @@ impl MergedRun<'_> {
         // Only frames that the group owns: those on its border come from their owners.
         let frames = self.job.plan.groups[k].frames();
         if self.submaps[k].is_none() {
-            writer.warn(format!("group {k} is not mapped: frames {frames:?} are as they were tracked"));
+            writer
+                .record_mut()
+                .warn(format!("group {k} is not mapped: frames {frames:?} are as they were tracked"));
             for index in frames {
                 let record = FrameRecord { keyframe: 0, ..self.run.frames[index] };
                 writer.push(self.run.exposures[index], record)?;
@@ -100,7 +102,11 @@ impl MergedRun<'_> {
             figures.loss += map.loss / self.submaps.iter().flatten().count() as f64;
             figures.peak_memory_bytes = figures.peak_memory_bytes.max(map.peak_memory_bytes);
         }
-        group.summary.warnings.into_iter().for_each(|warning| writer.warn(format!("group {k}: {warning}")));
+        group
+            .summary
+            .warnings
+            .into_iter()
+            .for_each(|warning| writer.record_mut().warn(format!("group {k}: {warning}")));
         Ok(())
     }
 }

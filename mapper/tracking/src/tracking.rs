@@ -152,7 +152,7 @@ pub fn track_and_keep(
     // The tracker counts the frames it was given, the run those of the data set.
     let was_given =
         |(index, record): (usize, &FrameRecord)| (record.reason != Some(Reason::Skipped)).then_some(index);
-    let mut given: Vec<usize> = run.frames().iter().enumerate().filter_map(was_given).collect();
+    let mut given: Vec<usize> = run.record().frames().iter().enumerate().filter_map(was_given).collect();
     for index in first..dataset.len() {
         let record = match track_frame(tracker.as_mut(), dataset, index, given.last().copied()) {
             Ok((result, ms)) => {
@@ -168,8 +168,8 @@ pub fn track_and_keep(
                 record
             }
             Err(reason) => {
-                run.warn(format!("frame {index} skipped: {reason}"));
-                let (exposure, record) = held(dataset.timestamp(index), run.exposures().last());
+                run.record_mut().warn(format!("frame {index} skipped: {reason}"));
+                let (exposure, record) = held(dataset.timestamp(index), run.record().exposures().last());
                 run.push_skipped(exposure, record)?;
                 record
             }
@@ -191,7 +191,7 @@ pub fn track_and_keep(
     for (&index, covariance) in given.iter().zip(uncertainty.covariances()) {
         covariances[index] = covariance;
     }
-    run.set_covariances(covariances);
+    run.record_mut().set_covariances(covariances);
     Ok(Tracked {
         disagreement: uncertainty.disagreement(),
         measured: by_frame(dataset.len(), &given, &uncertainty),
@@ -211,7 +211,11 @@ fn by_frame(frames: usize, given: &[usize], uncertainty: &Uncertainty) -> Vec<Me
 /// Replaces what `run` has of frame `index`.
 fn revise(dataset: &Dataset, run: &mut RunWriter, index: usize, revision: &Revision) {
     let Revision { world_from_camera, world_from_mid, blur, index: _ } = revision;
-    run.revise(index, timed(dataset.timestamp(index), world_from_camera, world_from_mid), f64::from(*blur));
+    run.record_mut().revise(
+        index,
+        timed(dataset.timestamp(index), world_from_camera, world_from_mid),
+        f64::from(*blur),
+    );
 }
 
 /// Why one frame was skipped.

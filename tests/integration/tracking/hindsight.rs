@@ -85,7 +85,7 @@ fn measurements_of_another_recording_are_refused() {
     let filmed = recording(1, 0.3, SensorModel::IDEAL);
     let mut run = RunWriter::create(filmed.output("run"), filmed.describe()).unwrap();
     let go_on = || ControlFlow::Continue(());
-    let _ = look_back(&filmed.dataset, &TrackingOptions::default(), &mut run, &[], go_on);
+    let _ = look_back(&filmed.dataset, &TrackingOptions::default(), run.record_mut(), &[], go_on);
 }
 
 #[test]

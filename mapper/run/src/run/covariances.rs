@@ -63,11 +63,11 @@ mod tests {
         // Errors along x and about the camera's y that go together.
         let mut covariance = Matrix6::from_diagonal(&Vector6::new(2.0, 1.0, 1.0, 1.0, 2.0, 1.0));
         (covariance[(0, 4)], covariance[(4, 0)]) = (1.0, 1.0);
-        writer.set_covariances(vec![None, Some(covariance), None]);
+        writer.record_mut().set_covariances(vec![None, Some(covariance), None]);
         // x becomes y.
         let quarter = Vector3::new(0.0, 0.0, std::f64::consts::FRAC_PI_2);
         let turn = RigidTransform::new(so3::exp(&quarter), Vector3::new(5.0, 0.0, 0.0));
-        writer.move_world(|_| turn);
+        writer.record_mut().move_world(|_| turn);
         let path = writer.folder().join(mba_io::run_layout::COVARIANCES_FILE);
         writer.finish(|_| ()).unwrap();
         let text = std::fs::read_to_string(path).unwrap();

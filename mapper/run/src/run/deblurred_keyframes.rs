@@ -36,7 +36,7 @@ pub fn write_deblurred_keyframes(
     run: &mut RunWriter,
     observe: impl Fn() -> ControlFlow<()> + Sync,
 ) -> Result<ControlFlow<()>, RunError> {
-    let keyframes = run.keyframes();
+    let keyframes = run.record().keyframes();
     // Threads would make their memory all the same.
     if keyframes.is_empty() {
         return Ok(ControlFlow::Continue(()));
@@ -60,7 +60,9 @@ pub fn write_deblurred_keyframes(
         match outcome {
             Ok(()) => run.count_deblurred(),
             Err(Failure::Output(error)) => return Err(error),
-            Err(Failure::Image(reason)) => run.warn(format!("keyframe {index} not deblurred: {reason}")),
+            Err(Failure::Image(reason)) => {
+                run.record_mut().warn(format!("keyframe {index} not deblurred: {reason}"))
+            }
         }
     }
     Ok(if is_stopped.into_inner() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })

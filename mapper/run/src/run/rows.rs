@@ -4,9 +4,9 @@ use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::trajectory_file::TimedExposure;
 use serde::{Deserialize, Serialize};
 
-use super::{FrameRecord, RunError, RunWriter, Upright};
+use super::{FrameRecord, RunError, RunWriter, TrackRecord, Upright};
 
-/// Everything that a [`RunWriter`] was told.
+/// A [`TrackRecord`] as it is stored.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct RunRows {
     /// Time and poses at opening, middle and closing of the shutter.
@@ -38,7 +38,7 @@ impl RunRows {
     }
 }
 
-impl RunWriter {
+impl TrackRecord {
     /// What was recorded so far.
     #[must_use]
     pub fn rows(&self) -> RunRows {
@@ -54,6 +54,21 @@ impl RunWriter {
         }
     }
 
+    /// Takes over what a run that was stopped had recorded.
+    pub(super) fn restore(&mut self, rows: RunRows) {
+        let exposure = |(timestamp, poses): (f64, [PoseNumbers; 3])| {
+            let [start, mid, end] = poses.map(pose);
+            TimedExposure { timestamp, start, mid, end }
+        };
+        self.exposures = rows.exposures.into_iter().map(exposure).collect();
+        self.frames = rows.frames;
+        self.skipped = rows.skipped;
+        self.upright = rows.upright;
+        self.warnings = rows.warnings;
+    }
+}
+
+impl RunWriter {
     /// As [`Self::restore`], in the folder of that very run: images that lie there are its own and stay.
     ///
     /// # Errors
@@ -68,15 +83,7 @@ impl RunWriter {
     /// # Errors
     /// As [`Self::flush`].
     pub fn restore(&mut self, rows: RunRows) -> Result<(), RunError> {
-        let exposure = |(timestamp, poses): (f64, [PoseNumbers; 3])| {
-            let [start, mid, end] = poses.map(pose);
-            TimedExposure { timestamp, start, mid, end }
-        };
-        self.exposures = rows.exposures.into_iter().map(exposure).collect();
-        self.frames = rows.frames;
-        self.skipped = rows.skipped;
-        self.upright = rows.upright;
-        self.warnings = rows.warnings;
+        self.record.restore(rows);
         self.flush()
     }
 }

@@ -10,15 +10,13 @@ use mba_io::trajectory_file::{TimedExposure, TimedPose, format_exposures, format
 use mba_io::whole_file::write_together;
 use mba_map::map::{FIELD_FILE, MAP_FILE, Scene, StoredMap};
 use mba_raster::gaussians::{ForViewers, Gaussians, write_ply, write_ply_for_viewers};
-use mba_tracker::geometry::RigidTransform;
-use nalgebra::Matrix6;
 
-use super::covariances::{format_covariances, turned};
+use super::covariances::format_covariances;
 use super::earlier_images::remove_keyframe_images;
 use super::merit::mid_pose;
 use super::{
-    CHECKPOINT_FILE, COVARIANCES_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, FrameStatus, RunError,
-    RunSettings, SUMMARY_FILE, Summary, TRAJECTORY_FILE, Upright, frame_record,
+    CHECKPOINT_FILE, COVARIANCES_FILE, EXPOSURES_FILE, FRAMES_FILE, FrameRecord, RunError, RunSettings,
+    SUMMARY_FILE, Summary, TRAJECTORY_FILE, TrackRecord, frame_record,
 };
 
 /// After this many new frames the folder is brought up to date, so that a killed run loses at most these.
@@ -37,15 +35,8 @@ pub struct RunWriter {
     /// Whether the files in the folder are those of this run.
     pub(super) is_started: bool,
     settings: RunSettings,
-    pub(super) exposures: Vec<TimedExposure>,
-    pub(super) frames: Vec<FrameRecord>,
-    /// By frame; empty where nothing is known.
-    covariances: Vec<Option<Matrix6<f64>>>,
-    pub(super) skipped: usize,
+    pub(super) record: TrackRecord,
     deblurred: usize,
-    pub(super) upright: Option<Upright>,
-    pub(super) warnings: Vec<String>,
-    unwritten: usize,
 }
 
 impl RunWriter {
@@ -55,19 +46,8 @@ impl RunWriter {
     /// [`RunError::Unwritable`] or [`RunError::DiskFull`].
     pub fn create(folder: OutputFolder, settings: RunSettings) -> Result<Self, RunError> {
         let has_earlier = folder.has_earlier();
-        let mut writer = Self {
-            folder,
-            is_started: false,
-            settings,
-            exposures: Vec::new(),
-            frames: Vec::new(),
-            covariances: Vec::new(),
-            skipped: 0,
-            deblurred: 0,
-            upright: None,
-            warnings: Vec::new(),
-            unwritten: 0,
-        };
+        let mut writer =
+            Self { folder, is_started: false, settings, record: TrackRecord::default(), deblurred: 0 };
         // An earlier run stays as it is until this one has proven itself.
         if !has_earlier {
             writer.start()?;
@@ -87,12 +67,12 @@ impl RunWriter {
     fn start(&mut self) -> Result<(), RunError> {
         self.write(&self.summary())?;
         self.is_started = true;
-        self.unwritten = 0;
+        self.record.unwritten = 0;
         if !self.folder.has_earlier() {
             return Ok(());
         }
         remove_keyframe_images(self.folder())?;
-        if self.covariances.is_empty() {
+        if self.record.covariances.is_empty() {
             remove(&self.folder().join(COVARIANCES_FILE))?;
         }
         // A map of the earlier run would be taken for one of this run.
@@ -102,8 +82,7 @@ impl RunWriter {
     /// Whether enough frames were found to take the place of an earlier run.
     fn is_proven(&self) -> bool {
         // Two frames: a single one agrees with itself.
-        let tracked = self.frames.iter().filter(|frame| frame.status != FrameStatus::Lost);
-        tracked.take(FRAMES_THAT_PROVE).count() == FRAMES_THAT_PROVE
+        self.record.found(FRAMES_THAT_PROVE) == FRAMES_THAT_PROVE
     }
 
     /// Adds one tracked frame; frames come in order of time.
@@ -111,10 +90,8 @@ impl RunWriter {
     /// # Errors
     /// As [`Self::create`]; the frame is kept for the next try.
     pub fn push(&mut self, exposure: TimedExposure, record: FrameRecord) -> Result<(), RunError> {
-        self.exposures.push(exposure);
-        self.frames.push(record);
-        self.unwritten += 1;
-        if self.unwritten >= FRAMES_PER_FLUSH { self.flush() } else { Ok(()) }
+        self.record.push(exposure, record);
+        if self.record.unwritten >= FRAMES_PER_FLUSH { self.flush() } else { Ok(()) }
     }
 
     /// Adds a frame that could not be tried: its pose is held, its status should be lost.
@@ -122,109 +99,19 @@ impl RunWriter {
     /// # Errors
     /// As [`Self::push`].
     pub fn push_skipped(&mut self, exposure: TimedExposure, record: FrameRecord) -> Result<(), RunError> {
-        self.skipped += 1;
+        self.record.skipped += 1;
         self.push(exposure, record)
     }
 
-    /// Replaces the exposure and the blur in pixels of frame `index`, counted from 0 in the order of pushing.
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    pub fn revise(&mut self, index: usize, exposure: TimedExposure, blur_px: f64) {
-        let (old, record) = self.frame_mut(index);
-        *old = exposure;
-        record.blur_px = blur_px;
-    }
-
-    /// A lost frame `index` was found at a pose, its motion is unknown: it counts as weak.
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    pub fn recover(&mut self, index: usize, world_from_camera: &RigidTransform) {
-        let (exposure, record) = self.frame_mut(index);
-        let [start, mid, end] = [*world_from_camera; 3];
-        *exposure = TimedExposure { start, mid, end, ..*exposure };
-        (record.status, record.blur_px) = (FrameStatus::Weak, 0.0);
-    }
-
-    /// Notes the covariance of the pose at mid exposure of every frame that has one, relative to the first frame: translation in
-    /// world axes, square metres, before rotation in the camera's, square radians.
-    ///
-    /// # Panics
-    /// If there is not one entry per frame.
-    pub fn set_covariances(&mut self, covariances: Vec<Option<Matrix6<f64>>>) {
-        assert_eq!(covariances.len(), self.frames.len(), "covariances of another run");
-        self.covariances = covariances;
-        self.unwritten += 1;
-    }
-
-    /// Moves every exposure to another world, which may be another one for each frame: `new_world_from_world` by index.
-    pub fn move_world(&mut self, new_world_from_world: impl Fn(usize) -> RigidTransform) {
-        for (index, exposure) in self.exposures.iter_mut().enumerate() {
-            let new_world_from_world = new_world_from_world(index);
-            *exposure = exposure.seen_from(&new_world_from_world);
-            if let Some(Some(covariance)) = self.covariances.get_mut(index) {
-                *covariance = turned(covariance, &new_world_from_world);
-            }
-        }
-        self.unwritten += self.exposures.len();
-    }
-
-    /// Notes that the z axis of the world that the exposures are in points up.
-    pub fn set_upright(&mut self, upright: Upright) {
-        self.upright = Some(upright);
-    }
-
-    /// How it is known that the world's z axis points up, if it is.
+    /// What is known of the frames so far.
     #[must_use]
-    pub fn upright(&self) -> Option<&Upright> {
-        self.upright.as_ref()
+    pub fn record(&self) -> &TrackRecord {
+        &self.record
     }
 
-    /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map.
-    ///
-    /// # Panics
-    /// If there is no such frame.
-    pub fn refine(&mut self, index: usize, exposure: TimedExposure, gain: f64, is_keyframe: bool) {
-        let (old, record) = self.frame_mut(index);
-        *old = exposure;
-        record.gain = gain;
-        record.keyframe = u8::from(is_keyframe);
-    }
-
-    /// What is known of a frame, which is about to change.
-    #[track_caller]
-    fn frame_mut(&mut self, index: usize) -> (&mut TimedExposure, &mut FrameRecord) {
-        let count = self.frames.len();
-        assert!(index < count, "frame {index} of a run of {count} frames");
-        self.unwritten += 1;
-        (&mut self.exposures[index], &mut self.frames[index])
-    }
-
-    /// Adds a sentence about the input to the summary.
-    pub fn warn(&mut self, warning: String) {
-        self.warnings.push(warning);
-    }
-
-    /// The exposures so far.
-    #[must_use]
-    pub fn exposures(&self) -> &[TimedExposure] {
-        &self.exposures
-    }
-
-    /// What was recorded of the frames so far.
-    #[must_use]
-    pub fn frames(&self) -> &[FrameRecord] {
-        &self.frames
-    }
-
-    /// Index and exposure of every keyframe so far.
-    #[must_use]
-    pub fn keyframes(&self) -> Vec<(usize, TimedExposure)> {
-        let all = self.exposures.iter().zip(&self.frames).enumerate();
-        all.filter(|(_, (_, record))| record.keyframe != 0)
-            .map(|(index, (exposure, _))| (index, *exposure))
-            .collect()
+    /// The same, to change what is known. The folder follows with the next [`Self::push`] or [`Self::flush`].
+    pub fn record_mut(&mut self) -> &mut TrackRecord {
+        &mut self.record
     }
 
     /// Writes the map of the run, and removes one of the other kind that an earlier run left.
@@ -293,7 +180,7 @@ impl RunWriter {
             return if self.is_proven() { self.start() } else { Ok(()) };
         }
         // Even after an error the next attempt waits for more frames: a full disk is not filled at every frame.
-        self.unwritten = 0;
+        self.record.unwritten = 0;
         self.write(&self.summary())
     }
 
@@ -313,7 +200,7 @@ impl RunWriter {
 
     /// Leaves the folder to the earlier run in it.
     pub fn give_up(mut self) {
-        self.unwritten = 0;
+        self.record.unwritten = 0;
     }
 
     /// Writes the finished run; `figures` completes the summary with figures of merit. What a stopped run would have
@@ -325,35 +212,38 @@ impl RunWriter {
         self.replace_earlier()?;
         let mut summary = Summary { complete: true, ..self.summary() };
         figures(&mut summary);
-        self.unwritten = 0;
+        self.record.unwritten = 0;
         self.write(&summary)?;
         self.remove_checkpoint()?;
         Ok(summary)
     }
 
     fn summary(&self) -> Summary {
-        let summary = Summary::of(&self.settings, &self.frames, self.skipped);
+        let summary = Summary::of(&self.settings, &self.record.frames, self.record.skipped);
         Summary {
-            warnings: self.warnings.clone(),
+            warnings: self.record.warnings.clone(),
             deblurred_keyframes: self.deblurred,
-            upright: self.upright,
+            upright: self.record.upright,
             ..summary
         }
     }
 
     fn write(&self, summary: &Summary) -> Result<(), RunError> {
-        let poses: Vec<TimedPose> = self.exposures.iter().map(mid_pose).collect();
+        let poses: Vec<TimedPose> = self.record.exposures.iter().map(mid_pose).collect();
         let json = serde_json::to_string_pretty(summary).map_err(|error| {
             RunError::unwritable(&self.folder().join(SUMMARY_FILE), io::Error::other(error))
         })?;
         let file = |name: &str, text: String| (self.folder().join(name), text);
         let mut files = vec![
             file(TRAJECTORY_FILE, format_trajectory(&poses)),
-            file(EXPOSURES_FILE, format_exposures(&self.exposures)),
-            file(FRAMES_FILE, frame_record::format_frames(&self.frames)),
+            file(EXPOSURES_FILE, format_exposures(&self.record.exposures)),
+            file(FRAMES_FILE, frame_record::format_frames(&self.record.frames)),
         ];
-        if !self.covariances.is_empty() {
-            files.push(file(COVARIANCES_FILE, format_covariances(&self.exposures, &self.covariances)));
+        if !self.record.covariances.is_empty() {
+            files.push(file(
+                COVARIANCES_FILE,
+                format_covariances(&self.record.exposures, &self.record.covariances),
+            ));
         }
         // Last: a folder with a summary is a run.
         files.push(file(SUMMARY_FILE, json + "\n"));
@@ -371,7 +261,7 @@ fn remove(path: &Path) -> Result<(), RunError> {
 
 impl Drop for RunWriter {
     fn drop(&mut self) {
-        if self.unwritten > 0 {
+        if self.record.unwritten > 0 {
             // There is nobody left to tell; the error that led here is reported by its own path.
             let _ = self.flush();
         }
@@ -380,9 +270,10 @@ impl Drop for RunWriter {
 
 #[cfg(test)]
 mod tests {
+    use mba_tracker::geometry::RigidTransform;
     use nalgebra::Vector3;
 
-    use super::super::{Run, RunCamera};
+    use super::super::{FrameStatus, Run, RunCamera};
     use super::*;
 
     fn settings() -> RunSettings {
@@ -426,7 +317,7 @@ mod tests {
         push(&mut writer, 1, FrameStatus::Weak);
         let (exposure, record) = frame(2, FrameStatus::Lost);
         writer.push_skipped(exposure, record).unwrap();
-        writer.warn("odd".into());
+        writer.record_mut().warn("odd".into());
         let summary = writer.finish(|_| ()).unwrap();
         assert_eq!((summary.frames.total, summary.frames.lost, summary.frames.skipped), (3, 1, 1));
         assert_eq!(summary.frames.tracked_share(), 2.0 / 3.0);
@@ -452,7 +343,7 @@ mod tests {
         push(&mut writer, 0, FrameStatus::Ok);
         push(&mut writer, 1, FrameStatus::Ok);
         let better = TimedExposure { timestamp: 0.0, ..frame(7, FrameStatus::Ok).0 };
-        writer.revise(0, better, 6.5);
+        writer.record_mut().revise(0, better, 6.5);
         writer.finish(|_| ()).unwrap();
         let run = Run::open(folder.path()).unwrap();
         assert_eq!(run.exposures, [better, frame(1, FrameStatus::Ok).0]);
@@ -465,7 +356,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut writer = RunWriter::create_in(folder.path(), settings()).unwrap();
         push(&mut writer, 0, FrameStatus::Ok);
-        writer.revise(1, frame(1, FrameStatus::Ok).0, 1.0);
+        writer.record_mut().revise(1, frame(1, FrameStatus::Ok).0, 1.0);
     }
 
     #[test]

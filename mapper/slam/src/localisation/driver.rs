@@ -96,7 +96,7 @@ impl Localiser<'_, '_, '_> {
                 {
                     let time = self.dataset.timestamp(*revised);
                     let exposure = timed(time, &revision.world_from_camera, &revision.world_from_mid);
-                    run.revise(*revised, exposure, f64::from(revision.blur));
+                    run.record_mut().revise(*revised, exposure, f64::from(revision.blur));
                 }
                 self.given.push(index);
                 let exposure = timed_result(&result);
@@ -108,7 +108,7 @@ impl Localiser<'_, '_, '_> {
                 run.push(exposure, record(&result, begin.elapsed().as_secs_f64() * 1e3))
             }
             Ok(None) => {
-                let (exposure, record) = held(timestamp, run.exposures().last());
+                let (exposure, record) = held(timestamp, run.record().exposures().last());
                 let ms = begin.elapsed().as_secs_f64() * 1e3;
                 run.push(exposure, FrameRecord { ms, reason: Some(Reason::NoMatch), ..record })
             }
@@ -156,7 +156,7 @@ impl Localiser<'_, '_, '_> {
 
     /// Looks for lost frames around where those after them and before them were found.
     fn recover_lost(&mut self, run: &mut RunWriter) {
-        let frames = run.frames().len();
+        let frames = run.record().frames().len();
         for index in (0..frames).rev() {
             self.recover(index, Some(index + 1).filter(|beside| *beside < frames), run);
         }
@@ -167,13 +167,13 @@ impl Localiser<'_, '_, '_> {
 
     /// Looks for frame `index`, if it is lost, around the frame `beside` it, if that is not lost.
     fn recover(&mut self, index: usize, beside: Option<usize>, run: &mut RunWriter) {
-        let is_lost = |index: usize| run.frames()[index].status == FrameStatus::Lost;
+        let is_lost = |index: usize| run.record().frames()[index].status == FrameStatus::Lost;
         let Some(beside) = beside.filter(|beside| is_lost(index) && !is_lost(*beside)) else { return };
-        let pose = run.exposures()[beside].mid;
+        let pose = run.record().exposures()[beside].mid;
         let Ok(image) = self.dataset.frame(index) else { return };
         let found = self.map.find_near(&image, &pose).and_then(|view| view.start_from);
         if let Some(pose) = found {
-            run.recover(index, &pose);
+            run.record_mut().recover(index, &pose);
             self.figures.recovered += 1;
         }
     }
@@ -181,7 +181,7 @@ impl Localiser<'_, '_, '_> {
 
 /// Pushes a frame that could not be tried.
 fn skip(index: usize, timestamp: f64, reason: &str, run: &mut RunWriter) -> Result<(), RunError> {
-    run.warn(format!("frame {index} skipped: {reason}"));
-    let (exposure, record) = held(timestamp, run.exposures().last());
+    run.record_mut().warn(format!("frame {index} skipped: {reason}"));
+    let (exposure, record) = held(timestamp, run.record().exposures().last());
     run.push_skipped(exposure, record)
 }

@@ -150,7 +150,7 @@ impl Work<'_> {
         // Not before it is known that there will be a map: this replaces an earlier one.
         let mut writer = RunWriter::create(out, describe)?;
         // The map is made in the world of the run.
-        run.summary.upright.into_iter().for_each(|upright| writer.set_upright(upright));
+        run.summary.upright.into_iter().for_each(|upright| writer.record_mut().set_upright(upright));
         output::push_tracked(&mut writer, &frames)?;
         let earlier = running.seconds;
         let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
@@ -202,7 +202,7 @@ impl Conclusion<'_> {
     ) -> Result<Summary, MapError> {
         let started = Instant::now();
         let dataset = self.dataset;
-        self.frames.warnings.drain(..).for_each(|warning| writer.warn(warning));
+        self.frames.warnings.drain(..).for_each(|warning| writer.record_mut().warn(warning));
         // Frames between keyframes follow; then what does not fit its neighbours is repaired.
         let fitted = Fitted { fit: self.fit, part: self.part };
         let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, fitted);
@@ -210,10 +210,10 @@ impl Conclusion<'_> {
             |(index, (exposure, _)): (usize, &(TimedExposure, f64))| self.frames.in_place(index, exposure);
         let exposures: Vec<_> = refined.iter().enumerate().map(in_place).collect();
         let (exposures, repairs) = self.frames.repair(dataset, &exposures)?;
-        repairs.into_iter().for_each(|repair| writer.warn(repair));
+        repairs.into_iter().for_each(|repair| writer.record_mut().warn(repair));
         if self.part.is_none() {
-            let contradictions = contradictions(dataset, &exposures, writer.frames());
-            contradictions.into_iter().for_each(|found| writer.warn(found.to_string()));
+            let contradictions = contradictions(dataset, &exposures, writer.record().frames());
+            contradictions.into_iter().for_each(|found| writer.record_mut().warn(found.to_string()));
         }
         output::write(&mut writer, dataset, &mut bundle, &exposures, &refined)?;
         // Figures need the files, and close the summary.
@@ -234,7 +234,7 @@ impl Conclusion<'_> {
         // Against the truth, where it is on record.
         // A part is not aligned with the truth by the frames that it has not seen.
         let merit = self.part.map_or_else(|| Merit::of(&exposures, dataset), |_| Merit::default());
-        let plausibility = plausibility(&exposures, writer.frames(), dataset);
+        let plausibility = plausibility(&exposures, writer.record().frames(), dataset);
         let summary = writer.finish(|summary| {
             summary.plausibility = plausibility;
             summary.trajectory = merit.trajectory;

@@ -40,7 +40,7 @@ pub(super) fn write(
     let mut is_keyframe = vec![false; exposures.len()];
     bundle.keyframes().iter().for_each(|keyframe| is_keyframe[keyframe.index] = true);
     for (index, (exposure, (_, log_gain))) in exposures.iter().zip(refined).enumerate() {
-        writer.refine(index, *exposure, log_gain.exp(), is_keyframe[index]);
+        writer.record_mut().refine(index, *exposure, log_gain.exp(), is_keyframe[index]);
     }
     write_map(writer, dataset, bundle)?;
     let config = tracker_config(dataset, &TrackingOptions::default());
@@ -78,8 +78,8 @@ fn write_map(writer: &RunWriter, dataset: &Dataset, bundle: &BundleAdjustment) -
         map,
         calibration.camera,
         &response,
-        writer.upright(),
-        (writer.exposures(), writer.frames()),
+        writer.record().upright(),
+        (writer.record().exposures(), writer.record().frames()),
     );
     writer.write_map_for_viewers(map, &viewing)
 }

@@ -106,7 +106,7 @@ impl BackEnd {
     fn save(&mut self) -> Result<(), SlamError> {
         let Some(mut keeper) = self.keeper.take() else { return Ok(()) };
         let parts = |instructions, seconds| MapperParts {
-            rows: self.writer.rows(),
+            rows: self.writer.record().rows(),
             keyframes: self.map.saved_keyframes(),
             max_gaussians: self.map.bundle.max_gaussians(),
             growth: self.map.growth(),
@@ -168,7 +168,7 @@ impl BackEnd {
                 flushed = Instant::now();
             }
             let flow = observe(SlamProgress::Frames {
-                frames: self.writer.exposures().len(),
+                frames: self.writer.record().exposures().len(),
                 keyframes: self.map.bundle.keyframes().len(),
                 map: self.map.bundle.state.map.size(),
                 loops: self.loops.closed(),
@@ -203,7 +203,7 @@ impl BackEnd {
         // The frame before is moved as the world has been since.
         if let Some((index, revised, blur_px)) = &frame.revision {
             let revised = self.in_this_world(revised, frame.moves);
-            self.writer.revise(*index, revised, *blur_px);
+            self.writer.record_mut().revise(*index, revised, *blur_px);
             self.map.revise(*index, &revised);
         }
         match &frame.skipped {
@@ -213,7 +213,7 @@ impl BackEnd {
                 self.writer.push_skipped(exposure, frame.record)?;
             }
             Some(Skipped::Unusable(reason)) => {
-                self.writer.warn(format!("frame {} skipped: {reason}", frame.index));
+                self.writer.record_mut().warn(format!("frame {} skipped: {reason}", frame.index));
                 self.writer.push_skipped(exposure, frame.record)?;
             }
         }
@@ -271,7 +271,7 @@ impl BackEnd {
         // Map, run and tracker move together; frames that are on their way are moved when they arrive.
         let poses = self.loops.correct(&self.map, image)?;
         let moves = self.map.bundle.move_keyframes(&poses);
-        self.writer.move_world(|index| moves.of(index));
+        self.writer.record_mut().move_world(|index| moves.of(index));
         self.moves.push(moves.last());
         Some(moves.last())
     }
@@ -321,13 +321,13 @@ impl BackEnd {
     /// Looks for the frames that were lost among all keyframes.
     pub(super) fn find_lost(&mut self, dataset: &Dataset) {
         let is_lost = |record: &FrameRecord| record.status == FrameStatus::Lost;
-        let records = self.writer.frames().iter().enumerate();
+        let records = self.writer.record().frames().iter().enumerate();
         let lost: Vec<usize> =
             records.filter(|(_, record)| is_lost(record)).map(|(index, _)| index).collect();
         for index in lost {
             let found = dataset.frame(index).ok().and_then(|image| self.loops.find(&self.map, &image));
             if let Some(pose) = found.and_then(|view| view.start_from) {
-                self.writer.recover(index, &pose);
+                self.writer.record_mut().recover(index, &pose);
             }
         }
     }

@@ -18,7 +18,9 @@ use super::saved::{Counts, Keeper, MapperParts, RefiningParts, Saved, SavedKeyfr
 use super::settings::{Arrival, SlamSettings};
 use super::{SlamError, front_end};
 use crate::mapping::{Checkpoint, Finish, MapError, MapProgress, Running, sensor};
-use crate::run::{CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, trajectory_figures};
+use crate::run::{
+    CHECKPOINT_FILE, RunSettings, RunWriter, SlamFigures, Summary, TrackRecord, trajectory_figures,
+};
 use crate::self_calibration::depth_lag_of_tracked;
 use crate::tracking::{TrackingError, tracker_config, upright_world};
 
@@ -93,7 +95,7 @@ impl SlamRun<'_> {
         let Self { dataset, settings, config } = self;
         let started = Instant::now();
         if stopped.is_none() {
-            dataset.warnings().iter().for_each(|warning| writer.warn(warning.to_string()));
+            dataset.warnings().iter().for_each(|warning| writer.record_mut().warn(warning.to_string()));
         }
         let mut back_end = BackEnd::new(dataset, config, settings, (writer, keeper));
         let earlier = stopped.as_ref().map_or(0.0, |(parts, _)| parts.seconds);
@@ -120,24 +122,24 @@ impl SlamRun<'_> {
         let disagreement = back_end.disagreement();
         let (mut grown, mut writer, figures, keeper) = back_end.finish();
         if let Some(lag) = depth_lag_of_tracked(dataset, disagreement) {
-            writer.warn(lag.to_string());
+            writer.record_mut().warn(lag.to_string());
         }
-        self.stand_upright(&mut grown.bundle, &mut writer);
+        self.stand_upright(&mut grown.bundle, writer.record_mut());
         if grown.bundle.state.map.is_empty() {
             return Err(MapError::NoDepth.into());
         }
         let figures = SlamFigures {
             live_frames_per_second: dataset.len() as f64 / live_seconds,
-            tracked_ate_m: trajectory_figures(writer.exposures(), dataset).map(|figures| figures.ate_m.rmse),
+            tracked_ate_m: trajectory_figures(writer.record().exposures(), dataset)
+                .map(|figures| figures.ate_m.rmse),
             ..figures
         };
         Ok(Refinement { bundle: grown.bundle, writer, keeper, figures, stopped: None, started, earlier })
     }
 
     /// Moves map and run into a world that stands upright, if it is known which way is up. A field cannot be turned.
-    fn stand_upright(&self, bundle: &mut BundleAdjustment, writer: &mut RunWriter) {
-        let (exposures, records) = (writer.exposures(), writer.frames());
-        let upright = upright_world(self.dataset, exposures, records, self.settings.up);
+    fn stand_upright(&self, bundle: &mut BundleAdjustment, track: &mut TrackRecord) {
+        let upright = upright_world(self.dataset, track.exposures(), track.frames(), self.settings.up);
         let Some((upright_from_world, how)) = upright.filter(|_| self.settings.kind == MapKind::Gaussians)
         else {
             return;
@@ -146,8 +148,8 @@ impl SlamRun<'_> {
         let poses: Vec<_> =
             frames.iter().map(|frame| upright_from_world.compose(&frame.path.mid())).collect();
         bundle.move_keyframes(&poses);
-        writer.move_world(|_| upright_from_world);
-        writer.set_upright(how);
+        track.move_world(|_| upright_from_world);
+        track.set_upright(how);
     }
 
     /// The refinement that a run was stopped in.
@@ -194,7 +196,7 @@ impl SlamRun<'_> {
         writer.write_map(stopped.as_ref().map_or(&bundle.state.map, |(_, _, state)| &state.map))?;
         writer.flush()?;
         let (dataset, mapping) = (self.dataset, self.settings.mapping());
-        let (exposures, records) = (writer.exposures(), writer.frames());
+        let (exposures, records) = (writer.record().exposures(), writer.record().frames());
         let (finish, running) = match stopped {
             None => (Finish::new(dataset, &mut bundle, exposures, records, &mapping)?, Running::default()),
             Some((steps, running, state)) => {
@@ -232,7 +234,7 @@ impl SlamRun<'_> {
 fn refining_parts(bundle: &BundleAdjustment, writer: &RunWriter, figures: &SlamFigures) -> RefiningParts {
     let SlamFigures { frames_on_map, late_frames, relocalisations, .. } = *figures;
     RefiningParts {
-        rows: writer.rows(),
+        rows: writer.record().rows(),
         keyframes: bundle.keyframes().iter().map(SavedKeyframe::from).collect(),
         max_gaussians: bundle.max_gaussians(),
         schedule_steps: bundle.schedule().steps(),

@@ -19,7 +19,7 @@ use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{ExpectedPath, FrameStatus, TrackerConfig};
 
-use crate::run::{FrameRecord, RunWriter};
+use crate::run::{FrameRecord, TrackRecord};
 use crate::tracking::{Measured, TrackingError, TrackingOptions, tracker_config};
 use backwards::SeenBackwards;
 use joined::{Ends, Joined};
@@ -33,7 +33,7 @@ const WORTHWHILE_BLUR: f64 = 1.0;
 /// Frames that a usual depth is taken from.
 const DEPTH_SAMPLES: usize = 8;
 
-/// Tracks the frames of a tracked `run` of `dataset` once more, backwards, and gives the run the poses and exposures that agree
+/// Tracks the frames of `dataset`, of which `track` is what tracking found, once more, backwards, and gives it the poses and exposures that agree
 /// best with both ways. `measured` has what each frame was aligned with. `observe` is called before every frame and says
 /// whether to go on. Takes as long as tracking did.
 ///
@@ -41,42 +41,43 @@ const DEPTH_SAMPLES: usize = 8;
 /// too; a frame that only the way back has found keeps that it was lost.
 ///
 /// # Errors
-/// [`TrackingError`]; the run is then as it was.
+/// [`TrackingError`]; the record is then as it was.
 ///
 /// # Panics
-/// If `measured` or the run is not of all frames of the data set.
+/// If `measured` or the record is not of all frames of the data set.
 pub fn look_back(
     dataset: &Dataset,
     options: &TrackingOptions,
-    run: &mut RunWriter,
+    track: &mut TrackRecord,
     measured: &[Measured],
     observe: impl FnMut() -> ControlFlow<()>,
 ) -> Result<(), TrackingError> {
     assert_eq!(measured.len(), dataset.len(), "what was measured belongs to another data set");
-    assert_eq!(run.frames().len(), dataset.len(), "not all frames were tracked");
-    if !is_worthwhile(dataset, options, run) {
+    assert_eq!(track.frames().len(), dataset.len(), "not all frames were tracked");
+    if !is_worthwhile(dataset, options, track) {
         return Ok(());
     }
-    let expected = expected_paths(dataset, run);
+    let expected = expected_paths(dataset, track);
     let seen = backwards::track_backwards(dataset, options, &expected, observe)?;
-    let forwards: Vec<RigidTransform> = run.exposures().iter().map(|exposure| exposure.mid).collect();
-    let ways = edges(dataset, run, measured, &forwards, &seen);
+    let forwards: Vec<RigidTransform> = track.exposures().iter().map(|exposure| exposure.mid).collect();
+    let ways = edges(dataset, track, measured, &forwards, &seen);
     // A graph that cannot be solved has numbers that make no sense, as those of a run that tracked nothing.
     let Ok(both) = joined::joined(forwards.clone(), &ways, &[]) else { return Ok(()) };
-    revise(run, &seen, &both);
-    let again = places_seen_again(dataset, options, run);
+    revise(track, &seen, &both);
+    let again = places_seen_again(dataset, options, track);
     if !again.is_empty()
         && let Ok(all) = joined::joined(forwards, &ways, &again)
     {
         let moves = |frame: usize| all.world_from_mid[frame].compose(&both.world_from_mid[frame].inverse());
-        run.move_world(moves);
+        track.move_world(moves);
     }
     Ok(())
 }
 
 /// Whether anything is known better on the way back.
-fn is_worthwhile(dataset: &Dataset, options: &TrackingOptions, run: &RunWriter) -> bool {
-    let found: Vec<f64> = run.frames().iter().filter(|record| is_found(record)).map(|r| r.blur_px).collect();
+fn is_worthwhile(dataset: &Dataset, options: &TrackingOptions, track: &TrackRecord) -> bool {
+    let found: Vec<f64> =
+        track.frames().iter().filter(|record| is_found(record)).map(|r| r.blur_px).collect();
     if found.len() < 2 || !dataset.has_images() {
         return false;
     }
@@ -96,21 +97,25 @@ fn is_found(record: &FrameRecord) -> bool {
 
 /// What keyframes measure of places that were seen long before; nothing where rows or depth have times of their own, which
 /// only the tracker puts right.
-fn places_seen_again(dataset: &Dataset, options: &TrackingOptions, run: &RunWriter) -> Vec<PoseGraphEdge> {
+fn places_seen_again(
+    dataset: &Dataset,
+    options: &TrackingOptions,
+    track: &TrackRecord,
+) -> Vec<PoseGraphEdge> {
     let config = tracker_config(dataset, options);
     if has_other_times(&config) {
         return Vec::new();
     }
-    let is_certain = |index: usize| run.frames()[index].status == FrameStatus::Ok;
+    let is_certain = |index: usize| track.frames()[index].status == FrameStatus::Ok;
     let keyframes: Vec<usize> =
-        run.keyframes().into_iter().map(|(index, _)| index).filter(|index| is_certain(*index)).collect();
-    revisits::revisits(dataset, &config, &keyframes, run.exposures())
+        track.keyframes().into_iter().map(|(index, _)| index).filter(|index| is_certain(*index)).collect();
+    revisits::revisits(dataset, &config, &keyframes, track.exposures())
 }
 
 /// Gives the frames of a run the poses and exposures that agree best with both ways.
-fn revise(run: &mut RunWriter, seen: &[Option<SeenBackwards>], joined: &Joined) {
+fn revise(track: &mut TrackRecord, seen: &[Option<SeenBackwards>], joined: &Joined) {
     for (frame, pose) in joined.world_from_mid.iter().enumerate() {
-        let (record, exposure) = (run.frames()[frame], run.exposures()[frame]);
+        let (record, exposure) = (track.frames()[frame], track.exposures()[frame]);
         if !is_found(&record) {
             continue;
         }
@@ -122,7 +127,7 @@ fn revise(run: &mut RunWriter, seen: &[Option<SeenBackwards>], joined: &Joined) 
             None => record.blur_px,
         };
         let ends = Ends { forwards: &exposure, forwards_agrees, back };
-        run.revise(frame, ends.around(pose), blur_px);
+        track.revise(frame, ends.around(pose), blur_px);
     }
 }
 
@@ -130,13 +135,13 @@ fn revise(run: &mut RunWriter, seen: &[Option<SeenBackwards>], joined: &Joined) 
 /// mistake; what was measured once is believed.
 fn edges(
     dataset: &Dataset,
-    run: &RunWriter,
+    track: &TrackRecord,
     measured: &[Measured],
     forwards: &[RigidTransform],
     seen: &[Option<SeenBackwards>],
 ) -> Vec<[Option<PoseGraphEdge>; 2]> {
     let rolls = dataset.calibration().readout.readout_seconds().is_some_and(|seconds| seconds != 0.0);
-    let first = run.frames().iter().position(is_found).unwrap_or(0);
+    let first = track.frames().iter().position(is_found).unwrap_or(0);
     let both = |(frame, record): (usize, &FrameRecord)| {
         if !is_found(record) {
             return [None, None];
@@ -149,16 +154,16 @@ fn edges(
         let factor = if is_bent { joined::FIRST_KEYFRAME } else { 1.0 };
         [joined::edge(frame, &measured[frame], |k| forwards[k], factor, back.is_some()), back]
     };
-    run.frames().iter().enumerate().map(both).collect()
+    track.frames().iter().enumerate().map(both).collect()
 }
 
 /// How the camera moves around every frame that was tracked for certain.
-fn expected_paths(dataset: &Dataset, run: &RunWriter) -> Vec<Option<ExpectedPath>> {
+fn expected_paths(dataset: &Dataset, track: &TrackRecord) -> Vec<Option<ExpectedPath>> {
     let certain = |(index, record): (usize, &FrameRecord)| {
-        let exposure = &run.exposures()[index];
+        let exposure = &track.exposures()[index];
         (record.status == FrameStatus::Ok).then(|| Sighting::of(exposure, dataset.exposure_seconds(index)))
     };
-    let sightings: Vec<Option<Sighting>> = run.frames().iter().enumerate().map(certain).collect();
+    let sightings: Vec<Option<Sighting>> = track.frames().iter().enumerate().map(certain).collect();
     let Some(depth) = survey(dataset, DEPTH_SAMPLES).median_depth else { return vec![None; sightings.len()] };
     let calibration = dataset.calibration();
     let motions = Motions::of(&sightings, &calibration.camera, depth, 1.0 / calibration.frame_rate);

@@ -115,7 +115,11 @@ impl TrackingCheckpoint {
         }
         let mut session = Vec::new();
         tracker.save(&mut |part| session.extend_from_slice(part));
-        save(&self.path, &self.identity, &Saving { rows: run.rows(), uncertainty, session: &session })?;
+        save(
+            &self.path,
+            &self.identity,
+            &Saving { rows: run.record().rows(), uncertainty, session: &session },
+        )?;
         self.last = Some(Instant::now());
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Where the worlds of the groups lie in one world.
 //!
 //! Every keyframe on a border was mapped by two groups or more. Each group is moved as a whole, so that all agree best on
-//! these keyframes: a pose graph over the groups whose edges have the informations that the groups state.
+//! these keyframes: a pose graph over the groups whose edges have the information matrices that the groups state.
 
 use mba_tracker::geometry::{RigidTransform, so3};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};

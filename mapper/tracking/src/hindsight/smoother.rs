@@ -18,7 +18,7 @@ type Chain = SMatrix<f64, ORDER, ORDER>;
 /// interval. Keeps what nothing was measured of solvable.
 const VAGUE: f64 = 1e-6;
 
-/// What was measured at one time: place and velocity with their informations.
+/// What was measured at one time: place and velocity, each with its information matrix.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Measurement {
     /// Frame intervals from the frame that is asked about.

@@ -9,7 +9,7 @@ use mba_mapper::hindsight::look_back;
 use mba_mapper::map::StoredMap;
 use mba_mapper::mapping::{MapSettings, map_dataset};
 use mba_mapper::output::{OutputFolder, Permission};
-use mba_mapper::run::{FrameRecord, FrameStatus, Merit, Run, RunSettings, RunWriter, Summary};
+use mba_mapper::run::{FrameRecord, FrameStatus, Merit, Run, RunSettings, RunWriter, Summary, TrackRecord};
 use mba_mapper::slam::{SlamSettings, run_slam};
 use mba_mapper::synth::{SynthConfig, SynthSequence, write_dataset};
 use mba_mapper::tracking::{TrackingOptions, track_and_keep, track_dataset};
@@ -25,6 +25,15 @@ pub struct BlurredSequence {
     folder: TempDir,
     /// The data set.
     pub dataset: Dataset,
+}
+
+/// How well the frames of a sequence were found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// Absolute trajectory error over all frames, root mean square, metres.
+    pub ate_m: f64,
+    /// Frames that are lost.
+    pub lost: usize,
 }
 
 impl BlurredSequence {
@@ -93,28 +102,26 @@ impl BlurredSequence {
         Run::open(&folder).expect("a run")
     }
 
-    /// Tracks the sequence into the folder `name`, then looks back; returns the error of the trajectory before and after, metres.
+    /// Tracks the sequence into the folder `name`, then looks back; returns how well it was found before and after.
     ///
     /// # Panics
     /// When that fails.
     #[must_use]
-    pub fn track_both_ways(&self, name: &str) -> [f64; 2] {
+    pub fn track_both_ways(&self, name: &str) -> [Found; 2] {
         let mut writer = RunWriter::create_in(&self.path(name), self.describe()).expect("a run");
         let options = TrackingOptions::default();
         let go_on = || ControlFlow::Continue(());
         let tracked =
             track_and_keep(&self.dataset, &options, &mut writer, None, |_| go_on()).expect("tracked");
-        let error = |writer: &RunWriter| {
-            Merit::of(writer.record().exposures(), &self.dataset)
-                .trajectory
-                .expect("a true trajectory")
-                .ate_m
-                .rmse
+        let found = |track: &TrackRecord| {
+            let trajectory = Merit::of(track.exposures(), &self.dataset).trajectory;
+            let lost = track.frames().iter().filter(|frame| frame.status == FrameStatus::Lost).count();
+            Found { ate_m: trajectory.expect("a true trajectory").ate_m.rmse, lost }
         };
-        let before = error(&writer);
+        let before = found(writer.record());
         look_back(&self.dataset, &options, writer.record_mut(), &tracked.measured, go_on)
             .expect("looked back");
-        [before, error(&writer)]
+        [before, found(writer.record())]
     }
 
     /// Maps the sequence from `run` into the folder `name`.

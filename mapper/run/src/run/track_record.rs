@@ -5,7 +5,7 @@ use mba_tracker::geometry::RigidTransform;
 use nalgebra::Matrix6;
 
 use super::covariances::turned;
-use super::{FrameRecord, FrameStatus, Upright};
+use super::{FrameRecord, FrameStatus, Reason, Upright};
 
 /// Poses and figures of all frames so far, in order of time, and what else a run has to say of its input. Knows nothing of
 /// files: [`RunWriter`](super::RunWriter) keeps a folder up to date with it.
@@ -87,6 +87,7 @@ impl TrackRecord {
         let [start, mid, end] = [*world_from_camera; 3];
         *exposure = TimedExposure { start, mid, end, ..*exposure };
         (record.status, record.blur_px) = (FrameStatus::Weak, 0.0);
+        record.reason = Some(Reason::FoundAgain);
     }
 
     /// Replaces the exposure and the gain of frame `index` by refined ones, and says whether it is a keyframe of the map.

@@ -45,6 +45,8 @@ pub(super) struct Joined {
     pub(super) world_from_mid: Vec<RigidTransform>,
     /// Whether what the first way and the way back say of each frame agrees with them.
     pub(super) agrees: Vec<[bool; 2]>,
+    /// Frames that are tied together by what was not left out have the same number.
+    pub(super) part: Vec<usize>,
 }
 
 /// Joins what both ways measured of every frame, `ways`, and what was measured of places that were seen `again`; `forwards` are
@@ -79,25 +81,29 @@ pub(super) fn joined(
     }
     let mut agrees = vec![[true; 2]; ways.len()];
     // Edges of places come last.
-    for [frame, way] in rejected.into_iter().filter_map(|edge| origins.get(edge).copied()) {
+    for [frame, way] in rejected.iter().filter_map(|edge| origins.get(*edge).copied()) {
         agrees[frame][way] = false;
     }
-    Ok(Joined { world_from_mid: graph.world_from_keyframe, agrees })
+    let part = parts(&graph, &rejected);
+    Ok(Joined { world_from_mid: graph.world_from_keyframe, agrees, part })
 }
 
 /// Whether what is tied together by all edges is so without those that were rejected, in ascending order.
 fn is_connected(graph: &PoseGraph, rejected: &[usize]) -> bool {
-    let parts = |is_counted: &dyn Fn(usize) -> bool| {
-        let mut part: Vec<usize> = (0..graph.world_from_keyframe.len()).collect();
-        let mut count = part.len();
-        for (_, edge) in graph.edges.iter().enumerate().filter(|(k, _)| is_counted(*k)) {
-            let [one, other] = [edge.from, edge.to].map(|node| root(&part, node));
-            count -= usize::from(one != other);
-            part[one] = other;
-        }
-        count
-    };
-    parts(&|_| true) == parts(&|edge| rejected.binary_search(&edge).is_err())
+    let count = |part: &[usize]| part.iter().enumerate().filter(|(node, part)| node == *part).count();
+    count(&parts(graph, &[])) == count(&parts(graph, rejected))
+}
+
+/// For every node the one that stands for all that are tied to it by edges other than those that were rejected, in ascending
+/// order.
+fn parts(graph: &PoseGraph, rejected: &[usize]) -> Vec<usize> {
+    let mut part: Vec<usize> = (0..graph.world_from_keyframe.len()).collect();
+    let counted = graph.edges.iter().enumerate().filter(|(edge, _)| rejected.binary_search(edge).is_err());
+    for (_, edge) in counted {
+        let [one, other] = [edge.from, edge.to].map(|node| root(&part, node));
+        part[one] = other;
+    }
+    (0..part.len()).map(|node| root(&part, node)).collect()
 }
 
 /// The node that stands for the part which `node` belongs to.
@@ -234,6 +240,9 @@ mod tests {
         // Nothing ever tied frame 3.
         assert!(is_connected(&graph, &[]) && is_connected(&graph, &[1]));
         assert!(!is_connected(&graph, &[1, 2]));
+        let [whole, cut] = [parts(&graph, &[1]), parts(&graph, &[0, 2])];
+        assert!(whole[0] == whole[1] && whole[1] == whole[2] && whole[3] != whole[0], "{whole:?}");
+        assert!(cut[1] == cut[2] && cut[0] != cut[1], "{cut:?}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ mod revisits;
 mod sightings;
 mod smoother;
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 
 use mba_adjust::pose_graph::PoseGraphEdge;
@@ -37,8 +38,8 @@ const DEPTH_SAMPLES: usize = 8;
 /// best with both ways. `measured` has what each frame was aligned with. `observe` is called before every frame and says
 /// whether to go on. Takes as long as tracking did.
 ///
-/// A recording that is sharp, or that is taken for sharp, stays as it is: the way back would know nothing new. Statuses stay,
-/// too; a frame that only the way back has found keeps that it was lost.
+/// A recording that is sharp, or that is taken for sharp, stays as it is unless frames are lost: the way back would know nothing
+/// new. A frame that only the way back has found becomes weak; all other statuses stay.
 ///
 /// # Errors
 /// [`TrackingError`]; the record is then as it was.
@@ -59,7 +60,7 @@ pub fn look_back(
     }
     let expected = expected_paths(dataset, track);
     let seen = backwards::track_backwards(dataset, options, &expected, observe)?;
-    let forwards: Vec<RigidTransform> = track.exposures().iter().map(|exposure| exposure.mid).collect();
+    let forwards = first_estimates(track, &seen);
     let ways = edges(dataset, track, measured, &forwards, &seen);
     // A graph that cannot be solved has numbers that make no sense, as those of a run that tracked nothing.
     let Ok(both) = joined::joined(forwards.clone(), &ways, &[]) else { return Ok(()) };
@@ -74,6 +75,30 @@ pub fn look_back(
     Ok(())
 }
 
+/// Where the frames were seen on the way forwards; of one that only the way back has found, where it would have been, if both
+/// ways agreed on the nearest frame that both have found.
+fn first_estimates(track: &TrackRecord, seen: &[Option<SeenBackwards>]) -> Vec<RigidTransform> {
+    let (records, exposures) = (track.frames(), track.exposures());
+    let of_back = |frame: usize| {
+        seen[frame].filter(|back| back.status == FrameStatus::Ok).map(|back| back.exposure.mid)
+    };
+    let shared: Vec<usize> =
+        (0..records.len()).filter(|&k| is_found(&records[k]) && of_back(k).is_some()).collect();
+    let estimate = |frame: usize| {
+        let held = exposures[frame].mid;
+        if is_found(&records[frame]) {
+            return held;
+        }
+        let nearest = shared.iter().min_by_key(|shared| shared.abs_diff(frame));
+        let moved = nearest.and_then(|&nearest| {
+            let world_from_back = exposures[nearest].mid.compose(&of_back(nearest)?.inverse());
+            Some(world_from_back.compose(&of_back(frame)?))
+        });
+        moved.unwrap_or(held)
+    };
+    (0..records.len()).map(estimate).collect()
+}
+
 /// Whether anything is known better on the way back.
 fn is_worthwhile(dataset: &Dataset, options: &TrackingOptions, track: &TrackRecord) -> bool {
     let found: Vec<f64> =
@@ -82,6 +107,7 @@ fn is_worthwhile(dataset: &Dataset, options: &TrackingOptions, track: &TrackReco
         return false;
     }
     has_other_times(&tracker_config(dataset, options))
+        || found.len() < track.len()
         || quantile(&found, 0.5).is_some_and(|blur| blur >= WORTHWHILE_BLUR)
 }
 
@@ -114,12 +140,20 @@ fn places_seen_again(
 
 /// Gives the frames of a run the poses and exposures that agree best with both ways.
 fn revise(track: &mut TrackRecord, seen: &[Option<SeenBackwards>], joined: &Joined) {
+    let found = |(frame, record): (usize, &FrameRecord)| is_found(record).then(|| joined.part[frame]);
+    let known: BTreeSet<usize> = track.frames().iter().enumerate().filter_map(found).collect();
     for (frame, pose) in joined.world_from_mid.iter().enumerate() {
         let (record, exposure) = (track.frames()[frame], track.exposures()[frame]);
+        let [mut forwards_agrees, back_agrees] = joined.agrees[frame];
         if !is_found(&record) {
-            continue;
+            // What only the way back has found is known if it is tied to what the first way has found.
+            let is_seen = seen[frame].is_some_and(|back| back.status == FrameStatus::Ok) && back_agrees;
+            if !(is_seen && known.contains(&joined.part[frame])) {
+                continue;
+            }
+            track.recover(frame, pose);
+            forwards_agrees = false;
         }
-        let [forwards_agrees, back_agrees] = joined.agrees[frame];
         let back = seen[frame].as_ref().filter(|back| back.status == FrameStatus::Ok && back_agrees);
         let blur_px = match back {
             Some(back) if forwards_agrees => 0.5 * (record.blur_px + back.blur_px),
@@ -143,13 +177,13 @@ fn edges(
     let rolls = dataset.calibration().readout.readout_seconds().is_some_and(|seconds| seconds != 0.0);
     let first = track.frames().iter().position(is_found).unwrap_or(0);
     let both = |(frame, record): (usize, &FrameRecord)| {
-        if !is_found(record) {
-            return [None, None];
-        }
         let back = seen[frame].as_ref().filter(|back| back.status == FrameStatus::Ok).and_then(|back| {
             let mid = |k: usize| seen[k].map_or(back.exposure.mid, |seen| seen.exposure.mid);
-            joined::edge(frame, &back.measured, mid, 1.0, true)
+            joined::edge(frame, &back.measured, mid, 1.0, is_found(record))
         });
+        if !is_found(record) {
+            return [None, back];
+        }
         let is_bent = rolls && measured[frame].reference == first;
         let factor = if is_bent { joined::FIRST_KEYFRAME } else { 1.0 };
         [joined::edge(frame, &measured[frame], |k| forwards[k], factor, back.is_some()), back]

@@ -89,28 +89,67 @@ pub fn blur_along(level: Level, image: &[f32], flow: &BlurFlow, views: usize, ou
 fn blur_blocks<S: Simd>(simd: S, image: &[f32], flow: &BlurFlow, views: usize, out: &mut [f32]) {
     let per_row = flow.blocks_per_row();
     let mut taps = Taps::none();
-    for (block, displacement) in flow.displacement.iter().enumerate() {
-        let (u, v) = ((block % per_row) * BLOCK_WIDTH, (block / per_row) * BLOCK_HEIGHT);
-        taps.fill(simd, displacement, views);
-        // Blocks whose paths stay inside need no check of their edges.
-        let sums = if path_is_inside(&taps, flow, u, v) {
-            block_sums::<S, true>(simd, image, flow, &taps, u, v)
-        } else {
-            block_sums::<S, false>(simd, image, flow, &taps, u, v)
-        };
-        for (row, sum) in (v..flow.height).zip(&sums) {
-            let mean = *sum * (1.0 / views as f32);
-            // The last block of a row may be narrower.
-            let columns = BLOCK_WIDTH.min(flow.width - u);
-            out[row * flow.width + u..][..columns].copy_from_slice(&mean.as_slice()[..columns]);
+    let mut blocks = flow.displacement.chunks_exact(per_row.max(1));
+    for v in (0..flow.height).step_by(BLOCK_HEIGHT) {
+        let Some(displacements) = blocks.next() else { return };
+        let out = &mut out[v * flow.width..];
+        for (u, displacement) in (0..flow.width).step_by(BLOCK_WIDTH).zip(displacements) {
+            taps.fill(simd, displacement, views);
+            // Blocks whose paths stay inside need no check of their edges, and are whole.
+            if path_is_inside(&taps, flow, u, v) {
+                let sums = sums_inside(simd, image, flow.width, &taps, u, v);
+                let mut rows = &mut out[u..];
+                for (row, sum) in sums.iter().enumerate() {
+                    (*sum * (1.0 / views as f32)).store_slice(&mut rows[..BLOCK_WIDTH]);
+                    if row + 1 < BLOCK_HEIGHT {
+                        rows = &mut rows[flow.width..];
+                    }
+                }
+                continue;
+            }
+            let sums = sums_at_border(simd, image, flow, &taps, u, v);
+            for (row, sum) in (0..flow.height - v).zip(&sums) {
+                let mean = *sum * (1.0 / views as f32);
+                // The last block of a row may be narrower.
+                let columns = BLOCK_WIDTH.min(flow.width - u);
+                out[row * flow.width + u..][..columns].copy_from_slice(&mean.as_slice()[..columns]);
+            }
         }
     }
 }
 
-/// Sums of the taps of one block; `INSIDE` says that no load leaves the image. Rows are interpolated horizontally
-/// first: each serves two rows of the block.
+/// Sums of the taps of one block of which no load leaves the image. Rows are interpolated horizontally first: each serves two
+/// rows of the block.
 #[inline(always)]
-fn block_sums<S: Simd, const INSIDE: bool>(
+fn sums_inside<S: Simd>(
+    simd: S,
+    image: &[f32],
+    width: usize,
+    taps: &Taps,
+    u: usize,
+    v: usize,
+) -> [f32x8<S>; BLOCK_HEIGHT] {
+    let mut sums = [f32x8::splat(simd, 0.0); BLOCK_HEIGHT];
+    let origin = (v * width + u) as i32;
+    let count = taps.count.min(MAX_VIRTUAL_VIEWS);
+    let (du, dv, fu, fv) = (&taps.du[..count], &taps.dv[..count], &taps.fu[..count], &taps.fv[..count]);
+    for k in 0..count {
+        let first = (origin + dv[k] * width as i32 + du[k]) as u32 as usize;
+        let mut rows = &image[first..];
+        let mut above = mixed(simd, &rows[..=BLOCK_WIDTH], fu[k]);
+        for sum in &mut sums {
+            rows = &rows[width..];
+            let below = mixed(simd, &rows[..=BLOCK_WIDTH], fu[k]);
+            *sum += (below - above).mul_add(fv[k], above);
+            above = below;
+        }
+    }
+    sums
+}
+
+/// Sums of the taps of one block whose loads may leave the image.
+#[inline(always)]
+fn sums_at_border<S: Simd>(
     simd: S,
     image: &[f32],
     flow: &BlurFlow,
@@ -119,22 +158,8 @@ fn block_sums<S: Simd, const INSIDE: bool>(
     v: usize,
 ) -> [f32x8<S>; BLOCK_HEIGHT] {
     let mut sums = [f32x8::splat(simd, 0.0); BLOCK_HEIGHT];
-    // Pixels from the first that a tap reads to the last.
-    let span = BLOCK_HEIGHT * flow.width + BLOCK_WIDTH + 1;
     for k in 0..taps.count {
         let (left, top) = (u as i32 + taps.du[k], v as i32 + taps.dv[k]);
-        if INSIDE || tap_is_inside(flow, left, top) {
-            let first = (top as u32 as usize).wrapping_mul(flow.width).wrapping_add(left as u32 as usize);
-            let mut rows = &image[first..][..span];
-            let mut above = mixed(simd, &rows[..=BLOCK_WIDTH], taps.fu[k]);
-            for sum in &mut sums {
-                rows = &rows[flow.width..];
-                let below = mixed(simd, &rows[..=BLOCK_WIDTH], taps.fu[k]);
-                *sum += (below - above).mul_add(taps.fv[k], above);
-                above = below;
-            }
-            continue;
-        }
         let mut above = mixed_row(simd, image, flow, left, top, taps.fu[k]);
         for (row, sum) in (top + 1..).zip(&mut sums) {
             let below = mixed_row(simd, image, flow, left, row, taps.fu[k]);

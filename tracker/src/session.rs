@@ -12,7 +12,7 @@ use crate::geometry::RigidTransform;
 use crate::trajectory::{BowedTrajectory, FrameTiming};
 
 /// What a saved session starts with: the version of its layout. On a machine of another byte order it is another number.
-const LAYOUT: u64 = 0x6d62_6173_6573_0002;
+const LAYOUT: u64 = 0x6d62_6173_6573_0003;
 
 /// A walk over the places of a session, which takes or fills them.
 pub(crate) struct Walk<'a> {

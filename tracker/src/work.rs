@@ -58,7 +58,7 @@ impl Work {
         self.view_pixels
             .saturating_add(self.patches.saturating_mul(100))
             .saturating_add(self.depth_points.saturating_mul(24))
-            .saturating_add(self.blur_taps / 16)
+            .saturating_add(self.blur_taps / 4)
             .saturating_add(self.image_pixels.saturating_mul(4))
     }
 

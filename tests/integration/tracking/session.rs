@@ -29,7 +29,8 @@ fn saved(tracker: &mut Tracker<'_>) -> Vec<u8> {
     bytes
 }
 
-/// Asserts that a tracker that is exchanged for another one after every single frame gives the results of one that is not.
+/// Asserts that a tracker that is exchanged for another one after every single frame gives the results of one that is not,
+/// and of one that is never saved.
 fn assert_goes_on(config: &TrackerConfig, frames: &[RenderedFrame]) -> Vec<FrameResult> {
     let mut memory = workspace(config);
     let mut tracker = Tracker::new(config, SimdLevel::new(), &mut memory).expect("memory");
@@ -53,6 +54,9 @@ fn assert_goes_on(config: &TrackerConfig, frames: &[RenderedFrame]) -> Vec<Frame
         assert_eq!(differs, None, "of {} bytes after frame {k}", session.len());
     }
     assert!(session.len() < config.workspace_len());
+    let mut memory = workspace(config);
+    let mut unsaved = Tracker::new(config, SimdLevel::new(), &mut memory).expect("memory");
+    assert_eq!(format!("{:?}", track(&mut unsaved, frames)), format!("{expected:?}"));
     expected
 }
 

@@ -37,6 +37,26 @@ fn no_frame_takes_four_times_the_median() {
 }
 
 #[test]
+fn the_frame_after_a_keyframe_does_part_of_its_deblurring() {
+    let camera = camera_of_width(320);
+    let frames = sequence(&PlaneScene::corner(5, 0.1), &camera, &SHAKE, 20);
+    let config = tracker_config(camera);
+    let results = track_within_bound(&config, &frames);
+    // What a keyframe and the next frame do is whole: nine blurs with as many samples of every pixel each.
+    let pixels = (camera.width * camera.height) as u64;
+    let is_keyframe = |index: usize| results.get(index).is_some_and(|result| result.is_keyframe);
+    let mut shared = 0;
+    for k in 2..results.len() - 1 {
+        if is_keyframe(k) && !is_keyframe(k - 1) && !is_keyframe(k + 1) {
+            let [now, later] = [k, k + 1].map(|index| results[index].work.blur_taps / pixels);
+            assert_eq!((now + later) % 9, 0, "frame {k}: {now} and {later} samples");
+            shared += usize::from(later > 0);
+        }
+    }
+    assert!(shared > 0, "no keyframe between others that are none was deblurred");
+}
+
+#[test]
 fn lost_frames_stay_within_the_bound_too() {
     let camera = camera_of_width(160);
     let mut frames = sequence(&PlaneScene::corner(5, 0.1), &camera, &SHAKE, 12);

@@ -34,6 +34,21 @@ pub struct DeblurScratch<'m> {
     captured: &'m mut [f32],
     reblurred: &'m mut [f32],
     correction: &'m mut [f32],
+    /// What has been begun and not concluded.
+    progress: Option<Progress>,
+}
+
+/// How far a deblurring is.
+#[derive(Clone, Copy, Debug)]
+struct Progress {
+    /// Samples of every blur path.
+    views: usize,
+    /// Blurs of the whole image that were done, and that are to be done.
+    done: usize,
+    of: usize,
+    /// As in [`DeblurReport`].
+    residual_before: f32,
+    residual_after: f32,
 }
 
 /// How well an image explains its captured version before and after deblurring.
@@ -66,22 +81,26 @@ impl<'m> DeblurScratch<'m> {
             captured: arena.take(width * height)?,
             reblurred: arena.take(width * height)?,
             correction: arena.take(width * height)?,
+            progress: None,
         })
     }
 
-    /// Remembers the image as captured, for [`Self::deblur`]; nothing if the memory is for no images at all.
+    /// Remembers the image as captured, for [`Self::deblur`], and forgets what has been begun; nothing if the memory is for no
+    /// images at all.
     pub fn capture(&mut self, image: &[f32]) {
+        self.progress = None;
         if !self.captured.is_empty() {
             self.captured.copy_from_slice(image);
         }
     }
 
-    /// Forgets the image as captured.
+    /// Forgets the image as captured, and what has been begun.
     pub(crate) fn forget(&mut self) {
         self.captured.fill(0.0);
+        self.progress = None;
     }
 
-    /// Visits the image as captured; all else serves within a call.
+    /// Visits the image as captured; all else serves until a deblurring is concluded.
     pub(crate) fn walk(&mut self, walk: &mut Walk<'_>) {
         walk.values(self.captured);
     }
@@ -110,24 +129,68 @@ impl<'m> DeblurScratch<'m> {
         iterations: usize,
         sharp: &mut [f32],
     ) -> DeblurReport {
-        let views = tap_count(longest);
+        self.begin(longest, iterations, sharp);
+        let taps = self.advance(level, usize::MAX, sharp);
+        let [residual_before, residual_after] = self.conclude(sharp).unwrap_or_default();
+        DeblurReport { residual_before, residual_after, kept: residual_after < residual_before, taps }
+    }
+
+    /// Begins what [`Self::deblur`] does in one go; `sharp` and the memory are then left alone but for [`Self::advance`], until
+    /// [`Self::conclude`].
+    pub(crate) fn begin(&mut self, longest: f32, iterations: usize, sharp: &mut [f32]) {
         sharp.copy_from_slice(self.captured);
-        let residual_before = self.compare(level, views, sharp);
-        let mut residual_after = residual_before;
-        for _ in 0..iterations {
-            // Richardson and Lucy: the ratio of captured to reblurred light, blurred once more, corrects every pixel.
-            blur_along(level, self.reblurred, &self.flow, views, self.correction);
-            for (light, factor) in sharp.iter_mut().zip(&*self.correction) {
-                *light *= factor;
+        self.progress = Some(Progress {
+            views: tap_count(longest),
+            done: 0,
+            // One to compare with, two for each iteration.
+            of: iterations.saturating_mul(2).saturating_add(1),
+            residual_before: 0.0,
+            residual_after: 0.0,
+        });
+    }
+
+    /// Blurs of the whole image that are left of what has been begun, and the samples of blur paths that each takes.
+    pub(crate) fn left(&self) -> (usize, u64) {
+        self.progress.map_or((0, 0), |progress| (progress.of - progress.done, self.taps_of(&progress)))
+    }
+
+    fn taps_of(&self, progress: &Progress) -> u64 {
+        progress.views as u64 * self.captured.len() as u64
+    }
+
+    /// Goes on with what has been begun by `blurs` of the whole image, or as many as are left; returns the samples of blur
+    /// paths that were taken.
+    pub(crate) fn advance(&mut self, level: Level, blurs: usize, sharp: &mut [f32]) -> u64 {
+        let Some(mut progress) = self.progress else { return 0 };
+        let first = progress.done;
+        while progress.done < progress.of && progress.done - first < blurs {
+            if progress.done % 2 == 0 {
+                progress.residual_after = self.compare(level, progress.views, sharp);
+                if progress.done == 0 {
+                    progress.residual_before = progress.residual_after;
+                }
+            } else {
+                // Richardson and Lucy: the ratio of captured to reblurred light, blurred once more, corrects every pixel.
+                blur_along(level, self.reblurred, &self.flow, progress.views, self.correction);
+                for (light, factor) in sharp.iter_mut().zip(&*self.correction) {
+                    *light *= factor;
+                }
             }
-            residual_after = self.compare(level, views, sharp);
+            progress.done += 1;
         }
+        self.progress = Some(progress);
+        (progress.done - first) as u64 * self.taps_of(&progress)
+    }
+
+    /// Ends what has been begun and done; `sharp` is then as [`Self::deblur`] leaves it. Returns the residuals before and after,
+    /// and nothing if nothing was begun.
+    pub(crate) fn conclude(&mut self, sharp: &mut [f32]) -> Option<[f32; 2]> {
+        let Progress { residual_before, residual_after, .. } = self.progress.take()?;
         let kept = residual_after < residual_before;
         if !kept {
             sharp.copy_from_slice(self.captured);
         }
-        let taps = ((2 * iterations + 1) * views) as u64 * self.captured.len() as u64;
-        DeblurReport { residual_before, residual_after, kept, taps }
+        Some([residual_before, residual_after])
     }
 
     /// Blurs `sharp` and leaves the ratio of captured to blurred light; returns the root mean square difference.
@@ -176,4 +239,39 @@ fn ratios<S: Simd>(simd: S, captured: &[f32], reblurred: &mut [f32]) -> f64 {
         total += f64::from(sum.as_slice().iter().sum::<f32>());
     }
     total
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec;
+    use std::vec::Vec;
+
+    use super::*;
+
+    #[test]
+    fn an_image_that_is_deblurred_step_by_step_is_the_same_bit_for_bit() {
+        let (width, height, iterations) = (64, 40, 3);
+        let captured: Vec<f32> =
+            (0..width * height).map(|k| 0.4 + 0.3 * (0.9 * (k % width) as f32).sin()).collect();
+        let mut memory = vec![0; DeblurScratch::bytes(width, height) + 64];
+        let mut scratch = DeblurScratch::carve(&mut Arena::new(&mut memory), width, height).expect("memory");
+        scratch.flow.displacement.fill([4.0, 1.0]);
+        scratch.capture(&captured);
+        let (mut at_once, mut in_steps) = (vec![0.0; width * height], vec![0.0; width * height]);
+        let report = scratch.deblur(Level::new(), 4.2, iterations, &mut at_once);
+        assert!(report.kept && at_once != captured);
+        assert_eq!(scratch.conclude(&mut in_steps), None, "nothing is left of it");
+
+        scratch.begin(4.2, iterations, &mut in_steps);
+        let mut taps = 0;
+        for (blurs, left) in [(0, 7), (2, 5), (1, 4), (9, 0)] {
+            taps += scratch.advance(Level::new(), blurs, &mut in_steps);
+            assert_eq!(scratch.left().0, left);
+        }
+        assert_eq!(scratch.conclude(&mut in_steps), Some([report.residual_before, report.residual_after]));
+        assert_eq!(in_steps, at_once);
+        // Seven blurs with four samples of every pixel.
+        let of_blur = 4 * (width * height) as u64;
+        assert_eq!((taps, report.taps), (7 * of_blur, taps));
+    }
 }

@@ -22,6 +22,7 @@ impl Tracker<'_> {
         if !view.world_from_camera.is_valid() {
             return Err(FrameError::Pose);
         }
+        self.finish_keyframe_ahead();
         self.keep_keyframe();
         self.keyframe.pyramid.fill(&view.colour, &self.luminance, &Vignetting::NONE);
         self.keyframe.depth.fill(self.simd, &view.depth, self.config.metres_per_unit);

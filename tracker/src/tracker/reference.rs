@@ -7,10 +7,12 @@ use super::frame::Frame;
 use super::history::{Motion, rotated};
 use super::keyframe_path::{PathError, PathRate};
 use super::track::{Tracker, exposure_of};
+use crate::deblur::DeblurScratch;
 use crate::geometry::RigidTransform;
 use crate::keyframe::typical_inverse_depth;
 use crate::trajectory::{BowedTrajectory, ExposureTrajectory};
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 
 /// Least whitened gradient of a keypoint: about twice the noise of a well-lit sensor.
 const MIN_STRENGTH: f32 = 0.02;
@@ -34,7 +36,7 @@ pub(super) enum Sharpness {
     AsCaptured,
 }
 
-impl Tracker<'_> {
+impl<'m> Tracker<'m> {
     /// Makes the current frame the keyframe.
     pub(super) fn promote(
         &mut self,
@@ -56,10 +58,41 @@ impl Tracker<'_> {
         self.deblur.capture(self.keyframe.pyramid.levels[0].pixels);
         self.keyframe.restart_surface(self.simd);
         self.brightness = BrightnessModel::default();
-        let deblurred = self.sharpen_keyframe(Sharpness::Deblurred);
-        if !deblurred {
+        self.is_unfinished = keyframe_from_camera.is_some();
+        if !self.is_unfinished {
+            return self.select_keypoints();
+        }
+        self.begin_sharpening(Sharpness::Deblurred);
+        let blurs = self.blurs_of_this_frame();
+        self.deblur_by(blurs);
+    }
+
+    /// How many of a new keyframe's blurs this frame does, so that it and the next one, which needs the keyframe, take about
+    /// as much work.
+    fn blurs_of_this_frame(&self) -> usize {
+        let (left, taps) = self.deblur.left();
+        let units_of_blur = Work { blur_taps: taps, ..Work::none() }.units().max(1);
+        // The next frame makes keypoints too, and is aligned as this one was at first.
+        let whole_image = Work { image_pixels: self.pixels(), ..Work::none() }.units();
+        let of_next = self.first_alignment.units() + 2 * whole_image;
+        let both = self.work.units() + of_next + left as u64 * units_of_blur;
+        let blurs = (both / 2).saturating_sub(self.work.units()) / units_of_blur;
+        left.min(usize::try_from(blurs).unwrap_or(usize::MAX))
+    }
+
+    /// Does what is left to do for a new keyframe. Until then nothing may be compared with it.
+    pub(super) fn finish_keyframe(&mut self) {
+        if mem::take(&mut self.is_unfinished) {
+            self.finish_sharpening();
             self.select_keypoints();
         }
+    }
+
+    /// The same between frames: the next one counts it as its own work.
+    pub(super) fn finish_keyframe_ahead(&mut self) {
+        self.work = self.work_ahead;
+        self.finish_keyframe();
+        self.work_ahead = self.work;
     }
 
     pub(super) fn set_keyframe_path(&mut self, path: BowedTrajectory, sharpness: Sharpness) {
@@ -68,13 +101,29 @@ impl Tracker<'_> {
         self.sharpen_keyframe(sharpness);
     }
 
-    /// Deblurs the keyframe as it was captured, gives it one time, with its own motion, and selects its keypoints; `false`
-    /// if there is nothing to do.
-    fn sharpen_keyframe(&mut self, sharpness: Sharpness) -> bool {
+    /// Deblurs the keyframe as it was captured, gives it one time, with its own motion, and selects its keypoints, if there is
+    /// anything to do.
+    fn sharpen_keyframe(&mut self, sharpness: Sharpness) {
+        self.begin_sharpening(sharpness);
+        if self.finish_sharpening() {
+            self.select_keypoints();
+        }
+    }
+
+    /// Finds out how the keyframe is blurred, and whether it is worth deblurring.
+    fn begin_sharpening(&mut self, sharpness: Sharpness) {
+        let path = self.keyframe.keyframe_from_camera;
+        if let Some(path) = path.filter(|_| sharpness == Sharpness::Deblurred) {
+            self.begin_deblurring(&path);
+        }
+    }
+
+    /// Deblurs the keyframe as far as it is not yet, and gives it one time; `false` if that changed nothing.
+    fn finish_sharpening(&mut self) -> bool {
         self.work.image_pixels += self.pixels();
         let Some(path) = self.keyframe.keyframe_from_camera else { return false };
         let timing = self.keyframe.timing;
-        let deblurred = sharpness == Sharpness::Deblurred && self.deblur_keyframe(&path);
+        let deblurred = self.finish_deblurring();
         if timing.reaches_outside() {
             let keyframe = &mut self.keyframe;
             self.rectify.rectify(
@@ -90,28 +139,20 @@ impl Tracker<'_> {
             return false;
         }
         self.keyframe.pyramid.reduce();
-        self.select_keypoints();
         true
     }
 
-    /// Deblurs the keyframe as it was captured with its path; `false` if it is not worth it. Its surface may have been moved
-    /// to the middle of the path already: over a frame that changes the blur by a share of itself.
-    ///
-    /// Where rows were exposed one after the other the result is the picture that is given one time afterwards: blur lies
-    /// along the motion of each row, and another path shears the same sharp picture.
-    fn deblur_keyframe(&mut self, path: &BowedTrajectory) -> bool {
+    /// Begins to deblur the keyframe as it was captured with its path, if it is worth it; otherwise its picture is that which
+    /// was captured. Its surface may have been moved to the middle of the path already: over a frame that changes the blur by
+    /// a share of itself.
+    fn begin_deblurring(&mut self, path: &BowedTrajectory) {
         let timing = self.keyframe.timing;
         self.deblurred_with = exposure_of(path, &timing).motion();
-        let sharp = if timing.is_rolling() {
-            self.rectify.image()
-        } else {
-            &mut *self.keyframe.pyramid.levels[0].pixels
-        };
-        let worth = DEBLUR_RANGE.contains(&self.keyframe.blur);
-        let typical = self.keyframe.depth.mean().filter(|_| worth);
-        let Some(typical) = typical.filter(|_| self.config.reference == ReferenceMode::Deblurred) else {
-            self.deblur.restore(sharp);
-            return false;
+        let worth =
+            self.config.reference == ReferenceMode::Deblurred && DEBLUR_RANGE.contains(&self.keyframe.blur);
+        let Some(typical) = self.keyframe.depth.mean().filter(|_| worth) else {
+            let (deblur, sharp) = self.deblurring();
+            return deblur.restore(sharp);
         };
         let longest = self.deblur.flow.fill(
             path,
@@ -121,9 +162,35 @@ impl Tracker<'_> {
             self.config.surface_level,
             typical,
         );
-        let report = self.deblur.deblur(self.simd, longest, self.config.deblur_iterations, sharp);
-        self.work.blur_taps += report.taps;
-        true
+        let iterations = self.config.deblur_iterations;
+        let (deblur, sharp) = self.deblurring();
+        deblur.begin(longest, iterations, sharp);
+    }
+
+    /// Goes on by as many blurs of the whole image.
+    fn deblur_by(&mut self, blurs: usize) {
+        let simd = self.simd;
+        let (deblur, sharp) = self.deblurring();
+        let taps = deblur.advance(simd, blurs, sharp);
+        self.work.blur_taps += taps;
+    }
+
+    /// Ends the deblurring that was begun; `false` if none was.
+    fn finish_deblurring(&mut self) -> bool {
+        self.deblur_by(usize::MAX);
+        let (deblur, sharp) = self.deblurring();
+        deblur.conclude(sharp).is_some()
+    }
+
+    /// What deblurs, and the picture that it works on: where rows were exposed one after the other, that which is given one
+    /// time afterwards. Blur lies along the motion of each row, and another path shears the same sharp picture.
+    fn deblurring(&mut self) -> (&mut DeblurScratch<'m>, &mut [f32]) {
+        let sharp = if self.keyframe.timing.is_rolling() {
+            self.rectify.image()
+        } else {
+            &mut *self.keyframe.pyramid.levels[0].pixels
+        };
+        (&mut self.deblur, sharp)
     }
 
     /// Compares the velocity of the last frame's path, if rows tell it, with that of the mid poses around it; returns a
@@ -186,7 +253,8 @@ impl Tracker<'_> {
         self.keyframe.refit_surface(self.simd);
         let change = exposure_of(&path, &self.keyframe.timing).motion() - self.deblurred_with;
         if self.blur_length(&ExposureTrajectory::from_mid_and_motion(&mid, &change)) > DEBLUR_CHANGE {
-            self.deblur_keyframe(&path);
+            self.begin_deblurring(&path);
+            self.finish_deblurring();
         }
         self.rectify.rectify_image(
             self.simd,

@@ -11,15 +11,17 @@ use crate::geometry::RigidTransform;
 use crate::session::{SessionError, Walk};
 use crate::trajectory::ExposureTrajectory;
 use crate::transfer::BrightnessModel;
+use crate::work::Work;
 
 impl Tracker<'_> {
     /// Gives all that this tracker knows to `write`, in parts of any length. A tracker with the same configuration that is
-    /// given these bytes by [`Self::restore`] goes on with the same results, bit for bit. Nothing changes, although the
-    /// tracker is borrowed as if it did: one function visits all places for saving and for restoring.
+    /// given these bytes by [`Self::restore`] goes on with the same results, bit for bit, and so does this one. What is left to
+    /// do for a new keyframe is done before.
     ///
     /// The bytes are in the order of this machine, and about as many as [`crate::TrackerConfig::workspace_len`] without what
     /// only serves within a frame: 4 MB for images of 640x480.
     pub fn save(&mut self, write: &mut dyn FnMut(&[u8])) {
+        self.finish_keyframe_ahead();
         self.walk(&mut Walk::save(write));
     }
 
@@ -29,6 +31,7 @@ impl Tracker<'_> {
     /// [`SessionError`] when the bytes are no such session. The tracker then has forgotten everything, as after
     /// [`Self::reset`].
     pub fn restore(&mut self, session: &[u8]) -> Result<(), SessionError> {
+        self.is_unfinished = false;
         let restored = Walk::restore(session).and_then(|mut walk| {
             self.walk(&mut walk);
             walk.end()?;
@@ -73,6 +76,10 @@ impl Tracker<'_> {
             span: _,
             gyro: _,
             work: _,
+            first_alignment: _,
+            // Nothing is left to do when a session is saved.
+            is_unfinished: _,
+            work_ahead,
             // Serves within an alignment.
             scratch: _,
         } = self;
@@ -93,6 +100,7 @@ impl Tracker<'_> {
         let BrightnessModel { gain, offset } = brightness;
         let Typical { residual, depth_residual } = typical;
         [gain, offset, residual, depth_residual].into_iter().for_each(|number| walk.value(number));
+        visit_work(walk, work_ahead);
         walk.value(last_timestamp);
         walk.count(frames);
     }
@@ -110,6 +118,7 @@ impl Tracker<'_> {
             && revision_is_sound
             // Counts go on without an overflow.
             && counts.iter().all(|count| *count < usize::MAX / 2)
+            && self.work_ahead.is_within(&self.config.work_bound())
             && self.keyframe.is_sound()
             && self.recent.is_sound()
             && self.deblur.is_sound()
@@ -126,6 +135,12 @@ const NO_TURNING: GyroReading = GyroReading {
 fn visit_gyro(walk: &mut Walk<'_>, GyroReading { angular_velocity, angular_acceleration }: &mut GyroReading) {
     walk.vector(angular_velocity);
     walk.vector(angular_acceleration);
+}
+
+fn visit_work(walk: &mut Walk<'_>, work: &mut Work) {
+    let Work { linearisations, patches, view_pixels, depth_points, blur_taps, image_pixels } = work;
+    let counts = [linearisations, patches, view_pixels, depth_points, blur_taps, image_pixels];
+    counts.into_iter().for_each(|count| walk.value(count));
 }
 
 fn no_revision() -> Revision {

@@ -92,6 +92,12 @@ pub struct Tracker<'m> {
     pub(super) frames: usize,
     /// What the current frame took so far.
     pub(super) work: Work,
+    /// What the first alignment of the current frame took: about what any takes whose motion is as expected.
+    pub(super) first_alignment: Work,
+    /// Whether something is left to do for a new keyframe, see [`Self::finish_keyframe`].
+    pub(super) is_unfinished: bool,
+    /// What was done for the next frame between this one and that.
+    pub(super) work_ahead: Work,
 }
 
 impl<'m> Tracker<'m> {
@@ -153,6 +159,9 @@ impl<'m> Tracker<'m> {
             last_timestamp: f64::NEG_INFINITY,
             frames: 0,
             work: Work::none(),
+            first_alignment: Work::none(),
+            is_unfinished: false,
+            work_ahead: Work::none(),
         })
     }
 
@@ -162,7 +171,9 @@ impl<'m> Tracker<'m> {
     /// [`FrameError`] when the frame cannot be used at all; the tracker is then unchanged.
     pub fn track(&mut self, frame: &Frame) -> Result<FrameResult, FrameError> {
         self.check(frame)?;
-        self.work = Work { image_pixels: self.pixels(), ..Work::none() };
+        self.work = core::mem::replace(&mut self.work_ahead, Work::none());
+        self.work.image_pixels += self.pixels();
+        self.finish_keyframe();
         self.pyramid.fill(&frame.colour, &self.luminance, &self.config.vignetting);
         self.depth_share = self.depth.fill(self.simd, &frame.depth, self.config.metres_per_unit);
         (self.timing, self.span) = self.config.readout.timing(frame);
@@ -206,6 +217,8 @@ impl<'m> Tracker<'m> {
         self.gyro_bias = Vector3::zeros();
         self.keyframe_gyro = None;
         self.deblurred_with = Vector6::zeros();
+        self.is_unfinished = false;
+        self.work_ahead = Work::none();
     }
 
     fn check(&self, frame: &Frame) -> Result<(), FrameError> {
@@ -279,8 +292,10 @@ impl<'m> Tracker<'m> {
         let mut revision = None;
         if self.path_is_modelled() && self.keyframe.keyframe_from_camera.is_none() {
             (aligned, revision) = self.bootstrap(frame, motion);
+            self.first_alignment = aligned.work;
         } else {
             aligned = self.align(frame, motion, self.config.align.blur, None);
+            self.first_alignment = aligned.work;
             let is_reachable = self.is_reachable(&aligned.outcome, motion, frame);
             if !is_reachable || fits_badly(&aligned.outcome, &self.typical) {
                 // As if nothing were known about the motion: all directions are tried.

@@ -21,7 +21,7 @@ use crate::mapping::{Running, dataset_fingerprint};
 use crate::run::RunRows;
 
 /// Layout of the content.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Time until the first checkpoint: a run that is stopped sooner has nothing worth keeping.
 const FIRST_AFTER: Duration = Duration::from_secs(1);

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use mba_mapper::hindsight::look_back;
 use mba_mapper::run::RunWriter;
-use mba_mapper::synth::{SceneName, SensorModel, SynthConfig};
+use mba_mapper::synth::{DepthSensor, NoiseModel, SceneName, SensorModel, SynthConfig};
 use mba_mapper::tracking::TrackingOptions;
 use mba_tests::blurred_sequence::BlurredSequence;
 use mba_tests::handheld::{RenderedFrame, Shake, camera_of_width, tracker_config, workspace};
@@ -97,7 +97,7 @@ fn a_sharp_recording_stays_as_it_was_tracked() {
 #[test]
 fn frames_that_are_lost_on_the_way_forwards_are_found_on_the_way_back() {
     // Small images of a hall that is half out of the sensor's reach, and rows at times of their own.
-    let sensor = SensorModel { readout_seconds: 0.02, ..SynthConfig::default().sensor };
+    let sensor = SensorModel { readout_seconds: 0.02, ..SensorModel::IDEAL };
     for seed in [2, 5, 8] {
         let sequence = BlurredSequence::new(SynthConfig {
             frames: 24,
@@ -106,6 +106,8 @@ fn frames_that_are_lost_on_the_way_forwards_are_found_on_the_way_back() {
             scene: SceneName::Hall,
             seed,
             mean_blur_px: 5.0,
+            noise: Some(NoiseModel::default()),
+            depth: DepthSensor::StructuredLight,
             sensor,
             ..SynthConfig::default()
         });

@@ -16,7 +16,6 @@ use super::order::{NO_RANK, Order};
 use super::pose::ViewGradient;
 use super::project::{Projected, project};
 use super::project_backward::{GradientRange, SplatGradients, ViewSums, project_backward};
-use super::tape::ViewTape;
 use super::tile::TileGrid;
 use super::view::RasterView;
 use super::view_share::ViewShare;
@@ -125,22 +124,6 @@ impl Rasterizer {
     #[must_use]
     pub fn new(level: Level) -> Self {
         Self { level }
-    }
-
-    /// Renders a view into `image`, which gets its size. What is returned takes gradients back.
-    ///
-    /// Gaussians are left out if they are behind the camera or nearer than 1 cm, fainter than a step of 8 bits,
-    /// outside of the image, or have a parameter that is not finite or without meaning.
-    pub fn forward<'a>(
-        &self,
-        gaussians: &'a Gaussians,
-        view: &RasterView,
-        scratch: &'a mut RasterScratch,
-        image: &mut RasterImage,
-    ) -> ViewTape<'a> {
-        self.render(gaussians, view, true, scratch);
-        self.store_image(scratch, image);
-        ViewTape { rasterizer: *self, gaussians, scratch }
     }
 
     /// All of [`Self::forward`] but the image. Without `geometry` depth is left out.
@@ -279,7 +262,7 @@ impl Rasterizer {
         });
     }
 
-    /// First stage of [`ViewTape::backward`], of which the conditions hold: sums of every splat over every tile.
+    /// First stage of [`ViewTape::backward`](super::ViewTape::backward), of which the conditions hold: sums of every splat over every tile.
     pub fn replay(&self, grad_image: &RasterImage, scratch: &mut RasterScratch) {
         self.replay_share(grad_image, ViewShare::WHOLE, scratch);
     }
@@ -321,7 +304,7 @@ impl Rasterizer {
         }
     }
 
-    /// Last stage of [`ViewTape::backward`], of which the conditions hold: sums over tiles, back to the parameters.
+    /// Last stage of [`ViewTape::backward`](super::ViewTape::backward), of which the conditions hold: sums over tiles, back to the parameters.
     pub fn project_backward(
         &self,
         gaussians: &Gaussians,
@@ -425,6 +408,7 @@ impl PoseSums {
 mod tests {
     use nalgebra::Vector3;
 
+    use super::super::ViewTape;
     use super::*;
     use crate::gaussians::Gaussian;
     use mba_tracker::geometry::{PinholeCamera, RigidTransform};

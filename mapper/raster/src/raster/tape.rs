@@ -1,8 +1,9 @@
-//! A view that was rendered, with all that its way back needs.
+//! A view, and the way back from it.
 
 use super::driver::{GaussianGradients, RasterScratch, Rasterizer};
 use super::image::RasterImage;
 use super::pose::ViewGradient;
+use super::view::RasterView;
 use crate::gaussians::Gaussians;
 
 /// What [`Rasterizer::forward`] leaves for the backward pass.
@@ -25,6 +26,24 @@ pub struct ViewTape<'a> {
     pub(super) rasterizer: Rasterizer,
     pub(super) gaussians: &'a Gaussians,
     pub(super) scratch: &'a mut RasterScratch,
+}
+
+impl Rasterizer {
+    /// Renders a view into `image`, which gets its size. What is returned takes gradients back.
+    ///
+    /// Gaussians are left out if they are behind the camera or nearer than 1 cm, fainter than a step of 8 bits,
+    /// outside of the image, or have a parameter that is not finite or without meaning.
+    pub fn forward<'a>(
+        &self,
+        gaussians: &'a Gaussians,
+        view: &RasterView,
+        scratch: &'a mut RasterScratch,
+        image: &mut RasterImage,
+    ) -> ViewTape<'a> {
+        self.render(gaussians, view, true, scratch);
+        self.store_image(scratch, image);
+        ViewTape { rasterizer: *self, gaussians, scratch }
+    }
 }
 
 impl ViewTape<'_> {

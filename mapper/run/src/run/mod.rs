@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `trajectory.txt` | camera-to-world at mid exposure, every input frame once, TUM lines |
 //! | `exposures.txt` | camera-to-world at opening, middle and closing of the shutter |
-//! | `covariances.txt` | covariance of the pose at mid exposure, of tracked runs, see [`RunWriter::set_covariances`] |
+//! | `covariances.txt` | covariance of the pose at mid exposure, of tracked runs, see [`TrackRecord::set_covariances`] |
 //! | `frames.csv` | one [`FrameRecord`] per frame |
 //! | `summary.json` | a [`Summary`] |
 //! | `map.ply` | a map of Gaussians, see [`mba_raster::gaussians::read_ply`], with [colours and sizes for viewers](for_viewers), or |

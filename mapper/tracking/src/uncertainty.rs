@@ -2,8 +2,8 @@
 
 use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::statistics::quantile;
-use mba_tracker::FrameResult;
 use mba_tracker::geometry::{RigidTransform, so3};
+use mba_tracker::{FrameResult, FrameStatus};
 use nalgebra::{Matrix3, Matrix6};
 use serde::{Deserialize, Serialize};
 
@@ -61,7 +61,7 @@ impl Uncertainty {
     }
 
     /// Covariance of each frame's pose at mid exposure relative to the first frame: translation in world axes, square metres,
-    /// then rotation in the camera's, square radians. None for the first frame and where a frame was not aligned.
+    /// then rotation in the camera's, square radians. None for the first frame and where a frame was lost.
     pub(crate) fn covariances(&self) -> impl Iterator<Item = Option<Matrix6<f64>>> {
         self.frames.iter().map(|frame| {
             let covariance = Matrix6::from(frame.covariance);
@@ -72,7 +72,7 @@ impl Uncertainty {
     }
 
     /// Takes in the next frame and returns the standard deviation of its position, metres: all axes together, at mid exposure,
-    /// relative to the first frame. None where the frame was not aligned.
+    /// relative to the first frame. None where the frame was lost.
     pub(crate) fn add(&mut self, result: &FrameResult) -> Option<f64> {
         self.disagreements.push(result.disagreement);
         let world_from_mid = result.world_from_mid;
@@ -98,8 +98,11 @@ impl Uncertainty {
 }
 
 /// Covariance of the pose of a frame relative to what it was aligned with as the alignment says it, translation in the axes of
-/// that; none where it was not aligned.
+/// that; none where it was not aligned, or lost: an alignment that was not believed says nothing about the pose that is held.
 fn covariance(result: &FrameResult) -> Option<Matrix6<f64>> {
+    if result.status == FrameStatus::Lost {
+        return None;
+    }
     let of_all = result.information.try_inverse()?;
     let of_pose = of_all.fixed_view::<6, 6>(0, 0);
     // Rounding leaves the halves a little different.

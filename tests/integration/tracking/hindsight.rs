@@ -94,26 +94,39 @@ fn a_sharp_recording_stays_as_it_was_tracked() {
     assert_eq!(before, after);
 }
 
+/// Small images of a hall that is half out of the sensor's reach, and rows at times of their own: frames are lost.
+fn hall(seed: u64) -> BlurredSequence {
+    BlurredSequence::new(SynthConfig {
+        frames: 24,
+        width: 160,
+        height: 120,
+        scene: SceneName::Hall,
+        seed,
+        mean_blur_px: 5.0,
+        noise: Some(NoiseModel::default()),
+        depth: DepthSensor::StructuredLight,
+        sensor: SensorModel { readout_seconds: 0.02, ..SensorModel::IDEAL },
+        ..SynthConfig::default()
+    })
+}
+
 #[test]
 fn frames_that_are_lost_on_the_way_forwards_are_found_on_the_way_back() {
-    // Small images of a hall that is half out of the sensor's reach, and rows at times of their own.
-    let sensor = SensorModel { readout_seconds: 0.02, ..SensorModel::IDEAL };
     for seed in [2, 5, 8] {
-        let sequence = BlurredSequence::new(SynthConfig {
-            frames: 24,
-            width: 160,
-            height: 120,
-            scene: SceneName::Hall,
-            seed,
-            mean_blur_px: 5.0,
-            noise: Some(NoiseModel::default()),
-            depth: DepthSensor::StructuredLight,
-            sensor,
-            ..SynthConfig::default()
-        });
-        let [before, after] = sequence.track_both_ways("run");
+        let [before, after] = hall(seed).track_both_ways("run");
         println!("seed {seed}: {before:?} -> {after:?}");
         assert!(before.lost >= 5 && after.lost <= 1, "seed {seed}: {before:?} -> {after:?}");
         assert!(after.ate_m < 0.5 * before.ate_m, "seed {seed}: {before:?} -> {after:?}");
+    }
+}
+
+#[test]
+fn a_lost_frame_does_not_say_how_certain_it_is() {
+    let frames = hall(5).track("run").frames;
+    let lost = frames.iter().filter(|frame| frame.status == FrameStatus::Lost).count();
+    assert!(lost >= 5, "{lost}");
+    for (index, frame) in frames.iter().enumerate() {
+        let is_lost = frame.status == FrameStatus::Lost;
+        assert_eq!(frame.sigma_m.is_none(), is_lost, "frame {index}: {frame:?}");
     }
 }

@@ -23,18 +23,6 @@ pub struct TrackRecord {
 }
 
 impl TrackRecord {
-    /// Number of frames.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.frames.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.frames.is_empty()
-    }
-
     /// The exposures so far.
     #[must_use]
     pub fn exposures(&self) -> &[TimedExposure] {

@@ -20,7 +20,7 @@ use mba_io::statistics::quantile;
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::{ExpectedPath, FrameStatus, TrackerConfig};
 
-use crate::run::{FrameRecord, TrackRecord};
+use crate::run::{FrameRecord, Reason, TrackRecord};
 use crate::tracking::{Measured, TrackingError, TrackingOptions, tracker_config};
 use backwards::SeenBackwards;
 use joined::{Ends, Joined};
@@ -38,8 +38,8 @@ const DEPTH_SAMPLES: usize = 8;
 /// best with both ways. `measured` has what each frame was aligned with. `observe` is called before every frame and says
 /// whether to go on. Takes as long as tracking did.
 ///
-/// A recording that is sharp, or that is taken for sharp, stays as it is unless frames are lost: the way back would know nothing
-/// new. A frame that only the way back has found becomes weak; all other statuses stay.
+/// A recording that is sharp, or that is taken for sharp, stays as it is unless frames are lost that show something: the way
+/// back would know nothing new. A frame that only the way back has found becomes weak; all other statuses stay.
 ///
 /// # Errors
 /// [`TrackingError`]; the record is then as it was.
@@ -106,8 +106,12 @@ fn is_worthwhile(dataset: &Dataset, options: &TrackingOptions, track: &TrackReco
     if found.len() < 2 || !dataset.has_images() {
         return false;
     }
+    // What shows nothing, or cannot be read, is lost on any way.
+    let is_missed = |record: &FrameRecord| {
+        !is_found(record) && !matches!(record.reason, Some(Reason::Blind | Reason::Skipped))
+    };
     has_other_times(&tracker_config(dataset, options))
-        || found.len() < track.len()
+        || track.frames().iter().any(is_missed)
         || quantile(&found, 0.5).is_some_and(|blur| blur >= WORTHWHILE_BLUR)
 }
 

@@ -6,6 +6,7 @@ use mba_mapper::dataset::{Calibration, Dataset, DatasetError};
 use mba_mapper::run::{Run, Summary};
 
 use crate::console::Console;
+use crate::written_run::absolute;
 
 /// Relative step between the focal lengths of repeated runs: a twentieth of a pixel in the corner, which nobody knows better.
 const NUDGE: f64 = 1e-4;
@@ -16,17 +17,21 @@ const WIDTH: usize = 22;
 /// Middle, least and most of a figure over repeated runs; none where a run has none.
 pub(super) type Spread = Option<[f64; 3]>;
 
-/// How often something is run, and where.
+/// What is run, how often, and where.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Repeats<'a> {
+    /// Folder of the data set.
+    pub(super) dataset: &'a Path,
+    /// Whether the runs are those of SLAM, or else of the tracker alone.
+    pub(super) maps: bool,
     /// Folder for the runs.
     pub(super) out: &'a Path,
     /// Runs of each row.
     pub(super) count: u16,
 }
 
-/// The summaries of the repeated runs of the row `name`. A run that was finished before is not made again; `run` makes one, with
-/// its number from 0 and its folder.
+/// The summaries of the repeated runs of the row `name`. A run of the same kind and data set that was finished before is not made
+/// again; `run` makes one, with its number from 0 and its folder.
 pub(super) fn summaries(
     repeats: Repeats<'_>,
     name: &str,
@@ -35,7 +40,7 @@ pub(super) fn summaries(
 ) -> anyhow::Result<Vec<Summary>> {
     let one = |repeat| {
         let out = folder(repeats.out, name, repeat);
-        if let Some(summary) = finished(&out) {
+        if let Some(summary) = finished(&out).filter(|summary| repeats.is_of(summary)) {
             return Ok(summary);
         }
         console.note(format!("{name}, run {} of {}:", repeat + 1, repeats.count));
@@ -44,10 +49,17 @@ pub(super) fn summaries(
     (0..repeats.count).map(one).collect()
 }
 
-/// Folder in `out` of run `repeat`, counted from 0, of the row `name`.
+impl Repeats<'_> {
+    /// Whether a run is one of these, rather than what something else left in its folder.
+    fn is_of(&self, run: &Summary) -> bool {
+        run.slam.is_some() == self.maps && run.settings.dataset == absolute(self.dataset)
+    }
+}
+
+/// Folder in `out` of run `repeat`, counted from 0, of the row `name`. No name of a row has a plus sign.
 fn folder(out: &Path, name: &str, repeat: u16) -> PathBuf {
     let name = name.replace(' ', "-");
-    let name = if repeat == 0 { name } else { format!("{name}-{}", repeat + 1) };
+    let name = if repeat == 0 { name } else { format!("{name}+{}", repeat + 1) };
     out.join(name)
 }
 
@@ -118,6 +130,13 @@ pub(super) fn cell(spread: Spread, digits: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn repeated_runs_have_folders_of_their_own() {
+        let folders = [("blur off", 0), ("desk", 0), ("desk", 1), ("desk-2", 0)]
+            .map(|(name, repeat)| folder(Path::new("out"), name, repeat));
+        assert_eq!(folders, ["out/blur-off", "out/desk", "out/desk+2", "out/desk-2"].map(PathBuf::from));
+    }
 
     #[test]
     fn repeated_figures_have_a_middle_and_a_spread() {

@@ -76,6 +76,20 @@ fn finished_runs_are_not_made_again_and_repeated_ones_have_a_spread() {
 }
 
 #[test]
+fn a_run_of_something_else_is_not_taken_for_one_of_the_sequence() {
+    let place = workplace();
+    let ate = |figures: &serde_json::Value, k: usize| figures["measured"][k]["ate_cm"][0].clone();
+    let before = bench(&place, &["--json"]).json();
+    // The names change places, and with them what lies in their folders.
+    for (old, new) in [("\"data\"", "\"x\""), ("= \"room\"\n[[", "= \"data\"\n[["), ("\"x\"", "\"room\"")] {
+        place.edit("two.toml", old, new);
+    }
+    let after = bench(&place, &["--json"]).json();
+    assert_ne!(ate(&before, 0), ate(&before, 1));
+    assert_eq!([ate(&after, 0), ate(&after, 1)], [ate(&before, 1), ate(&before, 0)]);
+}
+
+#[test]
 fn a_sequence_that_cannot_be_run_does_not_stop_the_others() {
     let place = workplace();
     fs::write(place.path("room/calibration.toml"), "width = 0").unwrap();

@@ -15,7 +15,8 @@ use crate::console::Console;
 /// As `mba slam` and `mba track`.
 pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
     let dataset = calibrate::completed(open::dataset(&args.dataset)?, Switch::On, console)?;
-    let repeats = Repeats { out: &args.out, count: args.repeats };
+    let maps = args.of == Ablated::Slam;
+    let repeats = Repeats { dataset: dataset.folder(), maps, out: &args.out, count: args.repeats };
     match args.of {
         Ablated::Slam => slam::run(&dataset, repeats, console),
         Ablated::Track => tracker::run(&dataset, repeats, console),

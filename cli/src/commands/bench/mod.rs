@@ -74,7 +74,8 @@ fn summaries(
 ) -> anyhow::Result<Vec<Summary>> {
     let dataset = open::dataset(&data.join(&sequence.dataset))?;
     let dataset = calibrate::completed(dataset, Switch::On, console)?;
-    let repeats = Repeats { out: &args.out, count: args.repeats };
+    let maps = benchmark.of == BenchmarkedCommand::Slam;
+    let repeats = Repeats { dataset: dataset.folder(), maps, out: &args.out, count: args.repeats };
     repeats::summaries(repeats, &sequence.name, console, |repeat, out| {
         one_run(benchmark.of, &nudged(&dataset, repeat)?, out, console)
     })

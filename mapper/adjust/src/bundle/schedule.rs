@@ -57,6 +57,8 @@ pub struct Schedule {
 /// How a schedule goes from its beginning to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Pace {
+    /// Lengths of the first steps of the Gaussians.
+    lengths: StepLengths,
     /// Until this position steps keep their length, then they shrink.
     hold: f64,
     /// Length of the last step, relative to the first.
@@ -72,18 +74,21 @@ struct Pace {
     density_changes: f64,
 }
 
-/// From a seeded map to a finished one.
+/// From a seeded map to a finished one. Steps stay long for most of it: few long ones reach what many short ones do, until
+/// what is left is noise of the order in which keyframes come.
 const WHOLE: Pace = Pace {
-    hold: 0.25,
-    final_length: 0.03,
-    paths_from: 0.3,
-    path_pixels: 0.03,
+    lengths: StepLengths { mean: 0.1, log_scale: 0.04, rotation: 0.02, opacity: 0.05, colour: 0.015 },
+    hold: 0.6,
+    final_length: 0.1,
+    paths_from: 0.15,
+    path_pixels: 0.06,
     only_motions: false,
     density_changes: 16.0,
 };
 /// From a map that has grown frame by frame to a finished one, in a fraction of the time: steps may not become short
 /// before the details are there, and paths, which are tracked, have little left to go.
 const FINISH: Pace = Pace {
+    lengths: GROWING_LENGTHS,
     hold: 0.2,
     final_length: 0.3,
     paths_from: 0.5,
@@ -94,6 +99,7 @@ const FINISH: Pace = Pace {
 /// From nothing to a finished field. A step sees few pixels: middles, which the tracker has measured with all of them,
 /// would only be shaken.
 const FIELD: Pace = Pace {
+    lengths: GROWING_LENGTHS,
     hold: 0.3,
     final_length: 0.05,
     paths_from: 0.3,
@@ -106,9 +112,9 @@ const DENSITY_UNTIL: f64 = 0.6;
 /// Visits from which the path of a keyframe moves while the map grows.
 const SETTLED: u32 = 6;
 
-/// Step lengths of Gaussians at the beginning, in the units of [`StepLengths`]: a centre moves by a twentieth of the size of its
-/// Gaussian.
-const LENGTHS: StepLengths =
+/// Step lengths of Gaussians while the map grows, in the units of [`StepLengths`]: a centre moves by a twentieth of the size
+/// of its Gaussian.
+const GROWING_LENGTHS: StepLengths =
     StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
 /// First step length of the logarithm of a gain: a fifth of a percent, half a step of 8 bits in bright light.
 const LOG_GAIN: f64 = 2e-3;
@@ -134,12 +140,14 @@ impl Schedule {
     #[must_use]
     pub fn new(keyframes: usize) -> Self {
         let visits = |per_keyframe: usize, least: usize| (keyframes * per_keyframe).max(least);
-        // At half resolution a step costs a quarter: the map takes shape there. Few keyframes still need so many steps.
-        let coarse = Stage { steps: visits(8, 300), time_share: 0.1, level: 1, spacing: 3.0, max_views: 9 };
-        // Most of the time goes into details. Views 4 pixels apart along the blur are enough while steps are long.
-        let fine = Stage { steps: visits(18, 600), time_share: 0.65, level: 0, spacing: 4.0, max_views: 11 };
-        // At last views are closer, so that what they leave out between them is not learnt as an edge.
-        let last = Stage { steps: visits(4, 100), time_share: 0.25, level: 0, spacing: 3.0, max_views: 21 };
+        // At half resolution a step costs less than half: the map takes shape there, and paths find most of their way, for
+        // which few keyframes need as many steps as some dozens.
+        let coarse = Stage { steps: visits(3, 200), time_share: 0.1, level: 1, spacing: 3.0, max_views: 9 };
+        // Most of the time goes into details. Views 3 pixels apart along the blur cost more than views 4 apart, and are worth
+        // more than the steps that could be made instead.
+        let fine = Stage { steps: visits(8, 280), time_share: 0.65, level: 0, spacing: 3.0, max_views: 11 };
+        // At last there are more views of long blur, so that what they leave out between them is not learnt as an edge.
+        let last = Stage { steps: visits(2, 60), time_share: 0.25, level: 0, spacing: 3.0, max_views: 21 };
         Self { stages: vec![coarse, fine, last], pace: WHOLE }
     }
 
@@ -176,7 +184,7 @@ impl Schedule {
             spacing: 4.0,
             max_views: 9,
             shrink: 1.0,
-            lengths: LENGTHS,
+            lengths: GROWING_LENGTHS,
             path_pixels: FINISH.path_pixels * paths,
             only_motions: true,
             log_gain: LOG_GAIN * paths,
@@ -212,7 +220,7 @@ impl Schedule {
     #[must_use]
     pub fn plan(&self, position: f64, timed: bool) -> StepPlan {
         let stage = self.stages[self.stage(position, timed)];
-        let Pace { hold, final_length, paths_from, path_pixels, only_motions, .. } = self.pace;
+        let Pace { lengths, hold, final_length, paths_from, path_pixels, only_motions, .. } = self.pace;
         // From its first to its last length a step shrinks by the same factor in equal parts of the schedule.
         let shrink = final_length.powf((position - hold).max(0.0) / (1.0 - hold));
         let paths = if position < paths_from { 0.0 } else { shrink };
@@ -221,7 +229,7 @@ impl Schedule {
             spacing: stage.spacing,
             max_views: stage.max_views,
             shrink: shrink as f32,
-            lengths: LENGTHS.scaled(shrink as f32),
+            lengths: lengths.scaled(shrink as f32),
             path_pixels: path_pixels * paths,
             only_motions,
             log_gain: LOG_GAIN * paths,
@@ -246,7 +254,7 @@ mod tests {
     #[test]
     fn stages_follow_each_other_and_end_at_full_resolution() {
         let schedule = Schedule::new(50);
-        assert_eq!(schedule.steps(), 50 * 30);
+        assert_eq!(schedule.steps(), 200 + 50 * 10);
         for timed in [false, true] {
             let stages: Vec<usize> = (0..=100).map(|k| schedule.stage(f64::from(k) / 100.0, timed)).collect();
             assert!(stages.is_sorted() && stages[0] == 0 && stages[100] == 2, "{stages:?}");
@@ -261,7 +269,7 @@ mod tests {
         let [start, middle, end] = [0.0, 0.5, 1.0].map(|position| schedule.plan(position, false));
         assert_eq!((start.path_pixels, start.log_gain), (0.0, 0.0));
         assert!(middle.path_pixels > end.path_pixels && end.path_pixels > 0.0);
-        assert!((end.lengths.mean / start.lengths.mean - 0.03).abs() < 1e-3);
+        assert!((end.lengths.mean / start.lengths.mean - 0.1).abs() < 1e-3);
     }
 
     #[test]

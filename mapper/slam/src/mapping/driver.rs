@@ -23,7 +23,7 @@ use crate::self_calibration::contradictions;
 pub(super) const BUDGET_RESERVE: f64 = 0.1;
 
 /// Layout of the checkpoint's content.
-const CHECKPOINT_VERSION: u32 = 4;
+const CHECKPOINT_VERSION: u32 = 5;
 
 /// Memory of the smoothed loss, steps.
 const SMOOTHING: f64 = 50.0;

@@ -77,7 +77,7 @@ struct Pace {
 /// From a seeded map to a finished one. Steps stay long for most of it: few long ones reach what many short ones do, until
 /// what is left is noise of the order in which keyframes come.
 const WHOLE: Pace = Pace {
-    lengths: StepLengths { mean: 0.1, log_scale: 0.04, rotation: 0.02, opacity: 0.05, colour: 0.015 },
+    lengths: StepLengths { mean: 0.1, log_scale: 0.04, rotation: 0.02, opacity: 0.05, colour: 0.01 },
     hold: 0.6,
     final_length: 0.1,
     paths_from: 0.15,

@@ -74,8 +74,9 @@ struct Pace {
     density_changes: f64,
 }
 
-/// From a seeded map to a finished one. Steps stay long for most of it: few long ones reach what many short ones do, until
-/// what is left is noise of the order in which keyframes come.
+/// From a seeded map to a finished one. Steps are twice as long as while it grows, and stay so for most of it: few long ones reach
+/// what many short ones do, until what is left is noise of the order in which keyframes come. Not so those of colours: at the
+/// border of what was seen they paint what no picture holds.
 const WHOLE: Pace = Pace {
     lengths: StepLengths { mean: 0.1, log_scale: 0.04, rotation: 0.02, opacity: 0.05, colour: 0.01 },
     hold: 0.6,
@@ -112,8 +113,8 @@ const DENSITY_UNTIL: f64 = 0.6;
 /// Visits from which the path of a keyframe moves while the map grows.
 const SETTLED: u32 = 6;
 
-/// Step lengths of Gaussians while the map grows, in the units of [`StepLengths`]: a centre moves by a twentieth of the size
-/// of its Gaussian.
+/// Step lengths of Gaussians while the map grows and when it is finished, in the units of [`StepLengths`]: a centre moves by a
+/// twentieth of the size of its Gaussian. A field has step lengths of its own.
 const GROWING_LENGTHS: StepLengths =
     StepLengths { mean: 0.05, log_scale: 0.02, rotation: 0.01, opacity: 0.05, colour: 0.01 };
 /// First step length of the logarithm of a gain: a fifth of a percent, half a step of 8 bits in bright light.

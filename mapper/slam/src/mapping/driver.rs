@@ -22,7 +22,7 @@ use crate::self_calibration::contradictions;
 /// Share of the time budget that is for seeding, the frames between keyframes, and writing.
 pub(super) const BUDGET_RESERVE: f64 = 0.1;
 
-/// Layout of the checkpoint's content.
+/// Layout of the checkpoint's content, and of the schedule that a map goes on with: a position in another one means another step.
 const CHECKPOINT_VERSION: u32 = 5;
 
 /// Memory of the smoothed loss, steps.

@@ -42,6 +42,7 @@ struct Facts {
     sampled_frames: usize,
     unreadable_frames: usize,
     frames_without_depth: usize,
+    frames_with_swapped_depth: usize,
     missing_depth_share: Option<f64>,
     median_depth_m: Option<f64>,
     ground_truth_poses: usize,
@@ -99,6 +100,7 @@ impl Facts {
             sampled_frames: survey.sampled,
             unreadable_frames: survey.unreadable.len(),
             frames_without_depth: survey.without_depth,
+            frames_with_swapped_depth: survey.swapped_depth,
             missing_depth_share: survey.missing_depth,
             median_depth_m: survey.median_depth,
             ground_truth_poses: dataset.ground_truth().len(),
@@ -135,6 +137,9 @@ fn warnings(dataset: &Dataset, camera: &CameraFacts, survey: Survey) -> Vec<Stri
     if survey.without_depth > 0 {
         let (empty, sampled) = (survey.without_depth, survey.sampled);
         warnings.push(format!("{empty} of {sampled} sampled depth images hold no depth at all"));
+    }
+    if survey.swapped_depth > 0 {
+        warnings.push(outcome::swapped(survey.swapped_depth, survey.sampled));
     }
     warnings
 }

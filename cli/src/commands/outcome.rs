@@ -55,7 +55,7 @@ fn reason(dataset: &Dataset) -> String {
 /// What a look at the images says against tracking any of them, in a sentence; `None` where nothing does.
 #[must_use]
 pub fn what_is_missing(survey: &Survey) -> Option<String> {
-    let Survey { sampled, unreadable, black, plain, without_depth, .. } = survey;
+    let Survey { sampled, unreadable, black, plain, without_depth, swapped_depth, .. } = survey;
     let readable = sampled - unreadable.len();
     // A single frame that is good can be the first: nothing follows it that could be aligned.
     let is_all_but_one = |count: usize| count > 0 && count + 1 >= readable;
@@ -73,6 +73,16 @@ pub fn what_is_missing(survey: &Survey) -> Option<String> {
         _ if is_all_but_one(*without_depth) => {
             Some(format!("{without_depth} of {readable} sampled depth images hold no depth at all"))
         }
+        _ if is_all_but_one(*swapped_depth) => Some(swapped(*swapped_depth, readable)),
         _ => None,
     }
+}
+
+/// That `count` of `sampled` depth images have the bytes of their values exchanged.
+#[must_use]
+pub fn swapped(count: usize, sampled: usize) -> String {
+    format!(
+        "{count} of {sampled} sampled depth images look byte-swapped, neighbouring pixels lie closer with the two bytes of \
+         each value exchanged (a 16-bit PNG has the high byte first)"
+    )
 }

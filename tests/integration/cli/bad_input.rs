@@ -81,6 +81,21 @@ fn depth_that_is_all_zero_is_told_and_survived() {
 }
 
 #[test]
+fn depth_with_exchanged_bytes_is_named() {
+    let place = Workplace::new();
+    for frame in 0..FRAMES {
+        // A wall that is not quite parallel to the image: what is flat has no steps to judge by.
+        let wall = |u: u32, v: u32| image::Luma([(2000 + 2 * u + v) as u16]);
+        let swapped = |u, v| image::Luma(wall(u, v).0.map(u16::swap_bytes));
+        let path = place.path(&format!("data/depth/{frame:06}.png"));
+        image::ImageBuffer::from_fn(160, 120, swapped).save(path).unwrap();
+    }
+    let told = info(&place);
+    assert_eq!(told.code, Some(1), "{}", told.stderr);
+    assert!(told.stdout.contains("8 of 8 sampled depth images look byte-swapped"), "{}", told.stdout);
+}
+
+#[test]
 fn a_size_that_differs_from_the_calibration_is_refused() {
     let place = Workplace::new();
     fs::write(place.path("data/calibration.toml"), calibration(320, 130.0)).unwrap();

@@ -15,6 +15,8 @@ pub struct Survey {
     pub plain: usize,
     /// Readable frames without a single depth value.
     pub without_depth: usize,
+    /// Readable frames whose depth values have their two bytes exchanged, as it looks.
+    pub swapped_depth: usize,
     /// Share (0 to 1) of the pixels of the readable frames whose depth is missing; `None` without readable frames.
     pub missing_depth: Option<f64>,
     /// Median depth in metres; `None` when all depth is missing.
@@ -26,7 +28,7 @@ pub struct Survey {
 pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
     let sampled = max_frames.clamp(1, dataset.len().max(1));
     let mut unreadable = Vec::new();
-    let (mut black, mut plain, mut without_depth) = (0, 0, 0);
+    let (mut black, mut plain, mut without_depth, mut swapped_depth) = (0, 0, 0, 0);
     let mut counts = DepthCounts::new();
     for k in 0..sampled {
         match dataset.frame(k * dataset.len() / sampled) {
@@ -36,6 +38,7 @@ pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
                 black += usize::from(mean < BLACK);
                 plain += usize::from(deviation < PLAIN);
                 without_depth += usize::from(frame.depth_is_empty());
+                swapped_depth += usize::from(looks_swapped(&frame.depth, frame.width));
                 counts.add(&frame);
             }
             Err(error) => unreadable.push(error.to_string()),
@@ -47,6 +50,7 @@ pub fn survey(dataset: &Dataset, max_frames: usize) -> Survey {
         black,
         plain,
         without_depth,
+        swapped_depth,
         missing_depth: counts.missing_share(),
         median_depth: counts.median_raw().map(|raw| raw / dataset.calibration().depth_scale),
     }
@@ -63,6 +67,39 @@ fn brightness(values: &[u8]) -> [f64; 2] {
     let squares: u64 = values.iter().map(|value| u64::from(*value).pow(2)).sum();
     let mean = sum as f64 / count;
     [mean, (squares as f64 / count - mean * mean).max(0.0).sqrt()]
+}
+
+/// How many times smoother depth has to be with its bytes exchanged to be taken for exchanged. A step of one raw unit is
+/// one of 256 with them, so right and wrong lie far from 1 on both sides.
+const SMOOTHER: u32 = 4;
+
+/// Pixels in which depth has to differ from its right neighbour before anything is said about its bytes.
+const FEWEST_STEPS: usize = 100;
+
+/// Whether raw depth of `width` columns is smoother with the two bytes of each value exchanged.
+///
+/// Surfaces are smooth, so steps between neighbours are a few raw units. Values that are all multiples of 256 (8-bit depth,
+/// shifted) are not judged: exchanged, none would lie beyond 255 units.
+fn looks_swapped(depth: &[u16], width: usize) -> bool {
+    let neighbours = || {
+        let rows = depth.chunks_exact(width.max(1));
+        rows.flat_map(|row| row.windows(2)).map(|pair| [pair[0], pair[1]]).filter(|pair| !pair.contains(&0))
+    };
+    if neighbours().all(|pair| pair[0].to_le_bytes()[0] == 0) {
+        return false;
+    }
+    let mut steps: Vec<u32> =
+        neighbours().map(|[a, b]| u32::from(a.abs_diff(b))).filter(|step| *step > 0).collect();
+    let mut exchanged: Vec<u32> = neighbours()
+        .map(|[a, b]| u32::from(a.swap_bytes().abs_diff(b.swap_bytes())))
+        .filter(|step| *step > 0)
+        .collect();
+    if steps.len() < FEWEST_STEPS {
+        return false;
+    }
+    // The median: edges of things are long steps with either order.
+    let median = |steps: &mut [u32]| *steps.select_nth_unstable(steps.len() / 2).1;
+    median(&mut steps) > SMOOTHER * median(&mut exchanged)
 }
 
 /// How often each raw depth value occurs.
@@ -98,6 +135,28 @@ impl DepthCounts {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn exchanged_bytes_are_recognised_by_their_steps() {
+        // A wall that is tilted in two directions, an edge in its middle, and holes.
+        let tilted = |unit: usize| -> Vec<u16> {
+            let raw = |k: usize| {
+                let (column, row) = (k % 40, k / 40);
+                let far = if column < 20 { 1500 } else { 2300 };
+                if k.is_multiple_of(17) { 0 } else { ((far + 3 * column + 2 * row) * unit) as u16 }
+            };
+            (0..40 * 30).map(raw).collect()
+        };
+        let swapped: Vec<u16> = tilted(1).iter().map(|raw| raw.swap_bytes()).collect();
+        assert!(!looks_swapped(&tilted(1), 40) && looks_swapped(&swapped, 40));
+        // Finer units fill both bytes.
+        let swapped: Vec<u16> = tilted(10).iter().map(|raw| raw.swap_bytes()).collect();
+        assert!(!looks_swapped(&tilted(10), 40) && looks_swapped(&swapped, 40));
+        // Eight bits of depth in the high byte are coarse and right.
+        let coarse: Vec<u16> = tilted(1).iter().map(|raw| raw / 16 * 256).collect();
+        assert!(!looks_swapped(&coarse, 40));
+        assert!(!looks_swapped(&[0; 1200], 40) && !looks_swapped(&[], 0));
+    }
 
     #[test]
     fn depth_counts_know_share_and_median() {

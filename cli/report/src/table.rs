@@ -135,6 +135,8 @@ pub fn map_rows(figures: &MapFigures) -> Vec<(&'static str, String)> {
         rows.extend((!text.is_empty()).then_some((label, text)));
     }
     rows.extend(mapped.map(|mapped| ("  where there is a map", where_mapped(mapped))));
+    let predicted = |db| format!("{db:.2} dB, {} that are no keyframes", figures.predicted_frames);
+    rows.extend(figures.predicted_psnr.map(|db| ("frames predicted", predicted(db))));
     rows
 }
 
@@ -198,6 +200,8 @@ mod tests {
             keyframe_psnr: Some(30.126),
             keyframe_ssim: Some(0.91),
             heldout_ssim: Some(0.875),
+            predicted_frames: 36,
+            predicted_psnr: Some(29.731),
             ..figures
         };
         let lines = map(&with_truth);
@@ -206,6 +210,7 @@ mod tests {
             "keyframes as captured   24.00 dB\n",
             "keyframes deblurred     30.13 dB, SSIM 0.9100\n",
             "views held out          SSIM 0.8750\n",
+            "frames predicted        29.73 dB, 36 that are no keyframes\n",
         ] {
             assert!(lines.contains(line), "{lines}");
         }

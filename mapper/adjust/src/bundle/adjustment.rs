@@ -336,6 +336,17 @@ impl<M: MapModel> BundleAdjustment<M> {
         *frame = best;
     }
 
+    /// Mean squared difference of display values (0 to 1) between the captured picture of a frame and what the map as it is
+    /// predicts of it: all virtual views of its path, its rows and its gain included, in full resolution.
+    pub fn prediction_error(&mut self, unmapped: &MapKeyframe, frame: &FrameState) -> f64 {
+        let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
+        let views = self.settings.view_count(unmapped, frame, &plan).of_row;
+        let seen = unmapped.observation.level(plan.level);
+        let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
+        let draw = FITS_FROM + unmapped.index as u64;
+        self.state.map.evaluate(&mut self.context, exposure, &plan, draw).terms.mean_square
+    }
+
     /// The next keyframe of a random order in which every keyframe comes once per round.
     fn next_keyframe(&mut self) -> Option<usize> {
         let count = self.keyframes.len().min(self.state.frames.len());

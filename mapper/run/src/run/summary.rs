@@ -127,6 +127,13 @@ pub struct MapFigures {
     pub loss: f64,
     /// Keyframes that took part.
     pub keyframes: usize,
+    /// Tracked frames that the map was not made of, whose captured pictures were compared with what it predicts.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub predicted_frames: usize,
+    /// Mean PSNR of these predictions against the captured pictures, dB: blur, rows and gain are predicted, too. It needs no
+    /// truth. Only path and gain of such a frame are fitted to its picture.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicted_psnr: Option<f64>,
     /// PSNR of the captured keyframes against the data set's sharp images, dB.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub keyframe_psnr_captured: Option<f64>,
@@ -148,6 +155,11 @@ pub struct MapFigures {
     /// Share (0 to 1) of these pixels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub heldout_mapped_share: Option<f64>,
+}
+
+/// Whether there is nothing to count.
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 /// How tracking and mapping at the same time went.

@@ -12,7 +12,7 @@ use mba_map::map::MapSize;
 use serde::{Deserialize, Serialize};
 
 use super::choice::choose_keyframes;
-use super::other_frames::{Fit, Fitted, all_exposures};
+use super::other_frames::{AllFrames, Fit, Fitted, all_exposures};
 use super::part::{MapPart, MappedKeyframe, MappedPart, mapped_keyframes};
 use super::prepare::{self, Frames};
 use super::{MapError, MapSettings, output, picture_figures};
@@ -205,7 +205,8 @@ impl Conclusion<'_> {
         self.frames.warnings.drain(..).for_each(|warning| writer.record_mut().warn(warning));
         // Frames between keyframes follow; then what does not fit its neighbours is repaired.
         let fitted = Fitted { fit: self.fit, part: self.part };
-        let refined = all_exposures(dataset, &mut bundle, &self.frames, self.settings, fitted);
+        let AllFrames { exposures: refined, predicted } =
+            all_exposures(dataset, &mut bundle, &self.frames, self.settings, fitted);
         let in_place =
             |(index, (exposure, _)): (usize, &(TimedExposure, f64))| self.frames.in_place(index, exposure);
         let exposures: Vec<_> = refined.iter().enumerate().map(in_place).collect();
@@ -229,6 +230,8 @@ impl Conclusion<'_> {
             peak_memory_bytes: output::peak_memory_bytes(),
             loss: running.loss,
             keyframes: bundle.keyframes().len(),
+            predicted_frames: predicted.frames,
+            predicted_psnr: predicted.psnr(),
             ..pictures
         };
         // Against the truth, where it is on record.

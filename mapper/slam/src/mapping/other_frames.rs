@@ -45,19 +45,53 @@ impl Fitted<'_> {
     }
 }
 
+/// What the fit of the frames between keyframes gave.
+pub(super) struct AllFrames {
+    /// Exposure and logarithm of the gain of every frame.
+    pub(super) exposures: Vec<(TimedExposure, f64)>,
+    /// How well the map predicts those that it was not made of.
+    pub(super) predicted: Prediction,
+}
+
+/// How well a finished map predicts captured pictures that it was not made of.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Prediction {
+    /// Sum of the PSNR of all frames, dB.
+    sum: f64,
+    /// Number of frames.
+    pub(super) frames: usize,
+}
+
+impl Prediction {
+    /// Adds a frame by the mean squared difference of display values (0 to 1).
+    fn add(&mut self, mean_square: f64) {
+        // Beyond 8-bit pictures that agree in every pixel nothing is told apart.
+        const FINEST: f64 = 1e-7;
+        self.sum -= 10.0 * mean_square.max(FINEST).log10();
+        self.frames += 1;
+    }
+
+    /// Mean PSNR in dB; `None` without frames.
+    pub(super) fn psnr(&self) -> Option<f64> {
+        (self.frames > 0).then(|| self.sum / self.frames as f64)
+    }
+}
+
 /// Exposures and logarithms of the gains of all frames: those of keyframes as they were refined, those of the others
 /// starting from the tracked ones moved along with the keyframe next to them and, as `fitted` says, fitted to the map. Frames
-/// that cannot be read are only moved along.
+/// that cannot be read are only moved along. Where all tracked frames are fitted, their pictures are compared with what the
+/// map predicts.
 pub(super) fn all_exposures(
     dataset: &Dataset,
     bundle: &mut BundleAdjustment,
     frames: &Frames,
     settings: &MapSettings,
     fitted: Fitted<'_>,
-) -> Vec<(TimedExposure, f64)> {
+) -> AllFrames {
     let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
     let sensor = sensor(dataset);
     let mut all = Vec::with_capacity(dataset.len());
+    let mut predicted = Prediction::default();
     for index in 0..frames.exposures.len() {
         // Keyframes were refined themselves.
         let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
@@ -94,10 +128,13 @@ pub(super) fn all_exposures(
             }
             // The map stays, the path follows its picture.
             bundle.fit_frame(&unmapped, &mut state, STEPS);
+            if fitted.fit == Fit::Tracked {
+                predicted.add(bundle.prediction_error(&unmapped, &state));
+            }
         }
         all.push((frames.exposure_of(index, &state), state.log_gain));
     }
-    all
+    AllFrames { exposures: all, predicted }
 }
 
 /// Which keyframe is nearest to frame `index`, `next` being the first after it.
@@ -111,6 +148,15 @@ fn nearest(keyframes: &[usize], next: usize, index: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn predictions_are_averaged_in_decibel() {
+        let mut predicted = Prediction::default();
+        assert_eq!(predicted.psnr(), None);
+        [1e-2, 1e-4, 0.0].into_iter().for_each(|mean_square| predicted.add(mean_square));
+        assert!((predicted.psnr().unwrap() - (20.0 + 40.0 + 70.0) / 3.0).abs() < 1e-9);
+        assert_eq!(predicted.frames, 3);
+    }
 
     #[test]
     fn the_nearest_keyframe_may_be_on_either_side() {

@@ -67,7 +67,9 @@ fn advise<T>(error: ImportError) -> anyhow::Result<T> {
     let hint = match error {
         ImportError::Output(error) => return refuse(error),
         ImportError::File(error) if is_disk_full(&error) => return Err(error.into()),
-        ImportError::Dataset(ref error) => dataset_hint(error).into_owned(),
+        ImportError::Dataset(ref error) | ImportError::Unfit { ref error, .. } => {
+            dataset_hint(error).into_owned()
+        }
         ImportError::Unusable { ref hint, .. } => hint.clone(),
         ImportError::Unknown { .. } => "see docs/import.md for how each has to lie on the disk".to_owned(),
         ImportError::Damaged { .. } => "restore the file, or record again".to_owned(),

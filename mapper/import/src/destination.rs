@@ -214,7 +214,8 @@ impl Destination {
         let calibration = facts.calibration(frame_rate(&times));
         write_calibration(&self.folder.join(CALIBRATION), &calibration)?;
         write_together(&self.texts())?;
-        let opened = dataset::open(&self.folder)?;
+        let opened = dataset::open(&self.folder)
+            .map_err(|error| ImportError::Unfit { source_path: source.to_owned(), error })?;
         // Whatever every frame has in common shows in the first.
         opened.frame(0).map_err(|error| ImportError::damaged(source, error.to_string()))?;
         self.is_finished = true;

@@ -43,6 +43,14 @@ pub enum ImportError {
     #[error(transparent)]
     Output(#[from] OutputError),
     /// What was recorded does not make a data set.
+    #[error("{source_path} does not make a data set: {error}")]
+    Unfit {
+        /// The recording.
+        source_path: PathBuf,
+        /// Why what was written of it is none. It has gone again.
+        error: DatasetError,
+    },
+    /// The source is a data set in a layout that is read as it is, and cannot be used.
     #[error(transparent)]
     Dataset(#[from] DatasetError),
 }

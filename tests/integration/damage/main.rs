@@ -91,6 +91,18 @@ const MAP: &[&str] = &["map", "data", "--trajectory", "run", "--out", "out", "--
 const TRACK: &[&str] = &["track", "data", "--out", "out"];
 const REPORT: &[&str] = &["report", "run", "--dataset", "data"];
 
+const LOCALISE: &[&str] = &["localise", "mapped", "data", "--out", "out", "--self-calibrate", "off"];
+const STATUS: &[&str] = &["status", "job"];
+const MERGE: &[&str] = &["merge", "job", "--without-missing", "--out", "out"];
+const BENCH: &[&str] = &["bench", "bench.toml", "--out", "out"];
+
+/// The import of a recording that has its folder or file in `recorded`.
+macro_rules! import {
+    ($recording:literal) => {
+        &["import", concat!("recorded/", $recording), "--out", "out"]
+    };
+}
+
 const fn text(file: &'static str, command: &'static [&'static str]) -> Subject {
     Subject { file, kind: Kind::Text, command }
 }
@@ -156,6 +168,34 @@ const SUBJECTS: &[Subject] = &[
     png("mapped/depth/000000.png", EXPORT),
     checkpoint("stopped/checkpoint", RESUME),
     checkpoint("stopped_slam/checkpoint", RESUME_SLAM),
+    text("mapped/exposures.txt", LOCALISE),
+    binary("mapped/map.ply", LOCALISE),
+    text("job/submaps.json", STATUS),
+    text("job/submaps.json", MERGE),
+    text("bench.toml", BENCH),
+    binary("recorded/none.bag", import!("none.bag")),
+    binary("recorded/bz2.bag", import!("bz2.bag")),
+    binary("recorded/lz4.bag", import!("lz4.bag")),
+    binary("recorded/plain.mcap", import!("plain.mcap")),
+    binary("recorded/lz4.mcap", import!("lz4.mcap")),
+    binary("recorded/zstd.mcap", import!("zstd.mcap")),
+    binary("recorded/folders/scene.sens", import!("folders/scene.sens")),
+    binary("recorded/folders/recording.r3d", import!("folders/recording.r3d")),
+    text("recorded/folders/stray/odometry.csv", import!("folders/stray")),
+    text("recorded/folders/stray/camera_matrix.csv", import!("folders/stray")),
+    text("recorded/folders/polycam/keyframes/cameras/59426112113.json", import!("folders/polycam")),
+    text("recorded/folders/scanner_app/frame_00000.json", import!("folders/scanner_app")),
+    text("recorded/folders/transforms/transforms.json", import!("folders/transforms")),
+    text("recorded/folders/open3d/camera_intrinsic.json", import!("folders/open3d")),
+    text("recorded/folders/mba_vo/unreal.json", import!("folders/mba_vo")),
+    text("recorded/folders/mba_vo/im_list.txt", import!("folders/mba_vo")),
+    text("recorded/folders/mba_vo/groundtruth.txt", import!("folders/mba_vo")),
+    binary("recorded/folders/mba_vo/depth_sharp_middle/0007.depth", import!("folders/mba_vo")),
+    text("recorded/folders/bundle_fusion/info.txt", import!("folders/bundle_fusion")),
+    text("recorded/folders/seven_scenes/frame-000000.pose.txt", import!("folders/seven_scenes")),
+    text("recorded/folders/icl_nuim/livingRoom0.gt.freiburg", import!("folders/icl_nuim")),
+    png("recorded/folders/icl_nuim/depth/0.png", import!("folders/icl_nuim")),
+    binary("recorded/folders/stray/rgb/000000.jpg", import!("folders/stray")),
 ];
 
 impl Subject {

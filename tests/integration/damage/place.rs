@@ -53,7 +53,7 @@ pub(crate) fn mba_within(folder: &Path, words: &[&str], kibibytes: usize) -> Out
 ///
 /// `data` and `listed` (data sets with and without associations), `run`, `mapped` (Gaussians), `field`, `stopped` (a
 /// checkpoint), `stopped_slam`, `estimated` (a run with what was found of the camera), `replica` and `scannet` (data sets in
-/// other layouts), `mesh.ply`, `poses.txt`, `images` and `others` (folders of images).
+/// other layouts), `job` (a split run), `recorded` (what is imported), `bench.toml`, `mesh.ply`, `poses.txt`, `images` and `others` (folders of images).
 pub(crate) fn pristine() -> TempDir {
     let sequence = BlurredSequence::tiny();
     let _ = sequence.run_of("run", sequence.truth());
@@ -81,10 +81,22 @@ pub(crate) fn pristine() -> TempDir {
     fs::copy(at("data/rgb/000000.png"), at("images/000000.png")).unwrap();
     fs::copy(at("data/depth/000001.png"), at("images/000001.png")).unwrap();
     copy(&at("images"), &at("others"));
+    recordings(place.path());
+    let split = mba(place.path(), &["split", "run", "--dataset", "data", "--out", "job"]);
+    assert_eq!(split.code, Some(0), "{}", split.stderr);
     let poses = fs::read_to_string(at("run/trajectory.txt")).unwrap();
     fs::write(at("poses.txt"), poses.lines().take(3).map(|line| format!("{line}\n")).collect::<String>())
         .unwrap();
     place
+}
+
+/// Recordings as other programs and cameras write them, and a benchmark of the data set.
+fn recordings(folder: &Path) {
+    let of_import = Path::new(env!("CARGO_MANIFEST_DIR")).join("../mapper/import/tests/data");
+    copy(&of_import, &folder.join("recorded"));
+    let benchmark = "title = \"one sequence\"\nof = \"track\"\n[[sequence]]\nname = \"tiny\"\ndataset = \"data\"\n\
+         [[published]]\nmethod = \"another\"\nsource = \"its table 1\"\nate_cm = { tiny = 1.5 }\n";
+    fs::write(folder.join("bench.toml"), benchmark).unwrap();
 }
 
 /// Adds what a data set may have and a synthetic one has not.

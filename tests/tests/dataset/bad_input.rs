@@ -149,7 +149,12 @@ fn absurd_calibrations_are_named_with_line_and_value() {
             "exposure_seconds = -1",
             "line 8: exposure_seconds = -1, expected a pos",
         ),
-        ("frame_rate = 30", "frame_rate = 0", "line 9: frame_rate = 0, expected a positive number of frames"),
+        (
+            "frame_rate = 30",
+            "frame_rate = 0",
+            "line 9: frame_rate = 0, expected frames per second, 0.001 to 100000",
+        ),
+        ("frame_rate = 30", "frame_rate = 1e300", "line 9: frame_rate = 1e300, expected frames per second"),
         (
             "frame_rate",
             "distortion = [0, 0, inf, 0, 0]\nframe_rate",

@@ -6,7 +6,7 @@ use nalgebra::Rotation3;
 
 use super::depth_camera::DepthCamera;
 use super::knowledge::{CalibrationSources, CameraFact, Knowledge};
-use super::validity::{InvalidValue, ROTATION, check_camera, check_positive, invalid, is_rotation};
+use super::validity::{InvalidValue, ROTATION, check_camera, invalid, is_rotation};
 
 /// Everything known about the camera of a data set.
 #[derive(Clone, Debug, PartialEq)]
@@ -145,6 +145,9 @@ const MAX_DEPTH_DELAY: f64 = 0.2;
 /// Exposure times that a video camera can have, seconds.
 const EXPOSURES: std::ops::RangeInclusive<f64> = 1e-6..=1.0;
 
+/// Frames per second that a calibration may have: from a picture in a quarter of an hour to more than any camera takes.
+const FRAME_RATES: std::ops::RangeInclusive<f64> = 1e-3..=1e5;
+
 impl Calibration {
     /// A camera of which nothing is known but its geometry, depth scale and frame rate: exposure and response are
     /// assumed, the shutter is taken for global, and nothing falls off or comes late.
@@ -245,7 +248,9 @@ impl Calibration {
             let expected = "a positive number of raw units per metre, above 1 and at most 1000000 (millimetres are 1000)";
             return Err(invalid("depth_scale", self.depth_scale, expected));
         }
-        check_positive("frame_rate", self.frame_rate, "a positive number of frames per second")?;
+        if !FRAME_RATES.contains(&self.frame_rate) {
+            return Err(invalid("frame_rate", self.frame_rate, "frames per second, 0.001 to 100000"));
+        }
         if let ExposureSource::Constant { seconds } | ExposureSource::Assumed { seconds } = self.exposure {
             check_exposure(seconds)?;
         }

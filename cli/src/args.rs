@@ -49,6 +49,10 @@ pub struct Global {
     /// Worker threads; default: one per core. Results do not depend on it
     #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=i64::from(MOST_THREADS)))]
     pub threads: Option<u16>,
+    /// SIMD level to compute with: sse2, sse4.2, avx2, avx512 or neon; default: the best of this machine. Results of two levels
+    /// differ in their last digits
+    #[arg(long, global = true, value_name = "LEVEL")]
+    pub simd: Option<String>,
     /// No progress and no notes on stderr
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,

@@ -7,6 +7,7 @@ use mba_mapper::gaussians::{COLOUR, LOG_SCALE, MEAN, OPACITY_LOGIT, ROTATION};
 use mba_mapper::map::StoredMap;
 use mba_mapper::rendering::{Behind, ViewRenderer};
 use mba_mapper::run::{self, RunCamera};
+use mba_tracker::SimdLevel;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -92,7 +93,8 @@ impl Map {
             let mut kept = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
             if kept.as_ref().is_none_or(|(camera, _)| *camera != eye) {
                 let renderer = OwnedRenderer::new(Arc::clone(&self.map), |map| {
-                    ViewRenderer::new(&**map, eye.pinhole(), &response, eye.depth_scale)
+                    let camera = eye.pinhole();
+                    ViewRenderer::new(SimdLevel::new(), &**map, camera, &response, eye.depth_scale)
                 });
                 *kept = Some((eye, renderer));
             }

@@ -23,6 +23,7 @@ use mba_mapper::dataset::Dataset;
 use mba_mapper::gaussians::Gaussians;
 use mba_mapper::output::{OutputFile, Permission};
 use mba_mapper::run::{Run, RunCamera};
+use mba_tracker::SimdLevel;
 
 pub use plots::{Plot, plots};
 pub use view::RunView;
@@ -40,16 +41,16 @@ pub const PICTURES_FOLDER: &str = "pictures";
 const CHART_START: &str = "<svg style=\"background: white; color: black\" ";
 
 /// Writes the charts of a run as `plots/*.svg`, its pictures as `pictures/*.png` and the report, over earlier ones, and
-/// with `force` over files of others; `dataset` supplies the ground truth and the captured images. Returns the report's
-/// path.
+/// with `force` over files of others; `dataset` supplies the ground truth and the captured images, and the map is rendered
+/// with the instructions `simd`. Returns the report's path.
 ///
 /// # Errors
 /// [`OutputError`](mba_mapper::output::OutputError) when a file may not be written; else when it cannot be, or a chart or
 /// picture cannot be made.
-pub fn write(run: &Run, dataset: Option<&Dataset>, force: bool) -> anyhow::Result<PathBuf> {
+pub fn write(run: &Run, simd: SimdLevel, dataset: Option<&Dataset>, force: bool) -> anyhow::Result<PathBuf> {
     let plots = plots(run, &RunView::new(run, dataset))?;
     let keyframes = pictures::keyframe_images(run, dataset);
-    let map = map_views::MapViews::new(run, dataset)?;
+    let map = map_views::MapViews::new(run, simd, dataset)?;
     let sections = compare::section(&pictures::keyframe_pictures(&keyframes)?) + &map.section()?;
     let numbered = keyframes.iter().zip(1..).map(|(images, number)| side_by_side::keyframe(number, images));
     let mut pictures = numbered.collect::<anyhow::Result<Vec<_>>>()?.concat();

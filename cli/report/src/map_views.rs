@@ -7,6 +7,7 @@ use mba_mapper::dataset::Dataset;
 use mba_mapper::map::{FIELD_FILE, MAP_FILE, StoredMap};
 use mba_mapper::rendering::{Behind, ViewRenderer};
 use mba_mapper::run::{Run, RunCamera};
+use mba_tracker::SimdLevel;
 
 use super::html::escape;
 use super::pictures::jpeg_base64;
@@ -37,7 +38,7 @@ impl MapViews {
     ///
     /// # Errors
     /// When the response of the run's camera is none.
-    pub(super) fn new(run: &Run, dataset: Option<&Dataset>) -> anyhow::Result<Self> {
+    pub(super) fn new(run: &Run, simd: SimdLevel, dataset: Option<&Dataset>) -> anyhow::Result<Self> {
         let none = Self { views: Vec::new(), about: None, viewer: String::new() };
         let Some(path) = StoredMap::path(&run.folder) else { return Ok(none) };
         let Ok(file) = fs::metadata(&path) else { return Ok(none) };
@@ -60,7 +61,8 @@ impl MapViews {
         };
         let own = run.summary.settings.camera.clone();
         let camera = own.or_else(|| dataset.map(|dataset| RunCamera::from(dataset.calibration())));
-        let shown = camera.as_ref().map(|camera| views(run, &map, camera)).transpose()?.unwrap_or_default();
+        let shown =
+            camera.as_ref().map(|camera| views(run, simd, &map, camera)).transpose()?.unwrap_or_default();
         let viewer = match (&map, &camera) {
             (StoredMap::Gaussians(map), Some(camera)) if map.len() <= MOST_GAUSSIANS => {
                 viewer::section(run, (map, camera), dataset, IN_REPORT)?
@@ -100,9 +102,14 @@ fn figure((index, image): &(usize, RgbImage)) -> anyhow::Result<String> {
 }
 
 /// The map from where some frames were taken.
-fn views(run: &Run, map: &StoredMap, camera: &RunCamera) -> anyhow::Result<Vec<(usize, RgbImage)>> {
+fn views(
+    run: &Run,
+    simd: SimdLevel,
+    map: &StoredMap,
+    camera: &RunCamera,
+) -> anyhow::Result<Vec<(usize, RgbImage)>> {
     let mut renderer =
-        ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
+        ViewRenderer::new(simd, map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
     let render = |index: usize| {
         let view = renderer.render(&run.exposures[index].mid, Behind::Surroundings);
         let [width, height] = view.size.map(|side| side as u32);

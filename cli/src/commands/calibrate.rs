@@ -7,6 +7,7 @@ use mba_mapper::dataset::{
     write_exposure_times,
 };
 use mba_mapper::self_calibration::{self, Finding};
+use mba_tracker::SimdLevel;
 use serde::Serialize;
 
 use super::open;
@@ -28,8 +29,8 @@ struct Result {
 ///
 /// # Errors
 /// Bad input when the data set cannot be used or the file not be written.
-pub fn run(args: &Calibrate, console: &Console) -> anyhow::Result<()> {
-    let recorded = open::dataset(&args.dataset)?;
+pub fn run(args: &Calibrate, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
+    let recorded = open::dataset(&args.dataset, simd)?;
     let was_complete = self_calibration::is_complete(&recorded);
     let (mut dataset, mut findings) = self_calibration::complete(recorded)?;
     if was_complete && dataset.calibration().sources.vignetting == Knowledge::Assumed {

@@ -6,6 +6,7 @@ use mba_mapper::dataset::Dataset;
 use mba_mapper::mapping::MapSettings;
 use mba_mapper::run::Run;
 use mba_mapper::synth::{DepthSensor, NoiseModel, SynthConfig};
+use mba_tracker::SimdLevel;
 
 use super::{map, open, synth, track};
 use crate::args::map::Mapping;
@@ -19,19 +20,19 @@ use crate::written_run::advise_report;
 ///
 /// # Errors
 /// Failure when the folder cannot be written.
-pub fn run(args: &Demo, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Demo, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let (name, config) =
         if args.quick { ("quick", quick()) } else { ("full", SynthConfig { frames: 60, ..realistic() }) };
     let data = args.out.join(format!("data-{name}"));
     let tracked = args.out.join(format!("run-{name}"));
     let mapped = args.out.join(format!("mapped-{name}"));
-    let dataset = sequence(config, &data, console)?;
+    let dataset = sequence(config, &data, simd, console)?;
     let how = (false, Resumption::Never);
     let interval = MapSettings::default().checkpoint_interval;
     track::track_into(&dataset, &tracked, how, interval, &Tracking::default(), console)?;
     let run = Run::open(&tracked)?;
     let summary = map::map_into(&dataset, &run, &mapped, how, &Mapping::default(), console)?;
-    let path = report::write(&Run::open(&mapped)?, Some(&dataset), false).or_else(advise_report)?;
+    let path = report::write(&Run::open(&mapped)?, simd, Some(&dataset), false).or_else(advise_report)?;
     console.result(&summary, table::summary)?;
     console.note(format!("open {} in a browser", path.display()));
     Ok(())
@@ -53,13 +54,18 @@ fn realistic() -> SynthConfig {
 }
 
 /// The sequence of an earlier demo in the same folder, or a new one.
-fn sequence(config: SynthConfig, folder: &Path, console: &Console) -> anyhow::Result<Dataset> {
+fn sequence(
+    config: SynthConfig,
+    folder: &Path,
+    simd: SimdLevel,
+    console: &Console,
+) -> anyhow::Result<Dataset> {
     // The lists of a sequence are written last, so one that can be opened is whole.
-    if let Ok(dataset) = mba_mapper::dataset::open(folder) {
+    if let Ok(dataset) = open::open_with(folder, simd) {
         console.note(format!("using the sequence in {}", folder.display()));
         return Ok(dataset);
     }
     console.note(format!("rendering {} blurred frames into {}", config.frames, folder.display()));
     synth::synthesise(config, folder, console)?;
-    open::dataset(folder)
+    open::dataset(folder, simd)
 }

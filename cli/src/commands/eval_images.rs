@@ -2,6 +2,7 @@
 
 use mba_mapper::dataset::FrameReadError;
 use mba_mapper::image_folders::{Comparison, ImageFolderError, compare};
+use mba_tracker::SimdLevel;
 
 use super::open;
 use crate::args::EvalImages;
@@ -13,8 +14,8 @@ use crate::report::image_table;
 ///
 /// # Errors
 /// Bad input when a folder or image is unreadable or the two do not belong together.
-pub fn run(args: &EvalImages, console: &Console) -> anyhow::Result<()> {
-    let dataset = args.captured.as_deref().map(open::dataset).transpose()?;
+pub fn run(args: &EvalImages, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
+    let dataset = args.captured.as_deref().map(|folder| open::dataset(folder, simd)).transpose()?;
     let comparison = Comparison {
         reference: &args.reference,
         estimate: &args.estimate,

@@ -8,6 +8,7 @@ use mba_mapper::evaluation::{
 };
 use mba_mapper::run::mid_pose;
 use mba_mapper::trajectory_file::{TimedExposure, TimedPose, has_exposures, read_exposures, read_trajectory};
+use mba_tracker::SimdLevel;
 use serde::Serialize;
 
 use super::open;
@@ -32,7 +33,7 @@ struct Report {
 ///
 /// # Errors
 /// Bad input when a file is unreadable or the two do not belong together.
-pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &EvalTrajectory, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let reference = Poses::read(&args.reference)?;
     let estimate = Poses::read(&args.estimate)?;
     let options = TrajectoryOptions { alignment: args.align.into(), max_dt: args.max_dt };
@@ -42,7 +43,7 @@ pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
                 [&args.reference, &args.estimate].map(|path| path.display().to_string());
             bad_input(format!("{estimate} against {reference}: {error}"), hint(&error))
         })?;
-    let blur = blur_figures(args, &reference, &estimate, console)?;
+    let blur = blur_figures((args, simd), &reference, &estimate, console)?;
     let report = Report { trajectory: TrajectoryFigures::from(&evaluation), blur };
     console.result(&report, |report| {
         let mut text = table::trajectory(&report.trajectory);
@@ -55,7 +56,7 @@ pub fn run(args: &EvalTrajectory, console: &Console) -> anyhow::Result<()> {
 
 /// The blur figures when both files have exposures and the data set is known.
 fn blur_figures(
-    args: &EvalTrajectory,
+    (args, simd): (&EvalTrajectory, SimdLevel),
     reference: &Poses,
     estimate: &Poses,
     console: &Console,
@@ -74,7 +75,7 @@ fn blur_figures(
         }
         _ => return Ok(None),
     };
-    let dataset = open::dataset(folder)?;
+    let dataset = open::dataset(folder, simd)?;
     let depth = survey(&dataset, SAMPLED_FRAMES).median_depth.ok_or_else(|| {
         bad_input(format!("{} has no depth at all", folder.display()), "leave --dataset out")
     })?;

@@ -15,6 +15,7 @@ use mba_mapper::run::{
     EXPOSURES_FILE, FRAMES_FILE, FrameStatus, Run, SUMMARY_FILE, TRAJECTORY_FILE, for_viewers, is_own_splats,
     path_of,
 };
+use mba_tracker::SimdLevel;
 use serde::Serialize;
 
 use super::open;
@@ -40,17 +41,17 @@ struct Written {
 ///
 /// # Errors
 /// Bad input when the run or its data set cannot be used; failure when the disk is full.
-pub fn run(args: &Export, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Export, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
     if let (Some(images), None) = (args.images, args.to.layout()) {
         let message = format!("--images {} is given, but {} has no images", name(&images), name(&args.to));
         return Err(bad_input(message, "leave it out, or give --to nerfstudio or --to colmap"));
     }
     match (args.to.layout(), args.to) {
-        (Some(layout), _) => scene(args, &run, layout, console),
+        (Some(layout), _) => scene(args, (&run, simd), layout, console),
         (None, ExportFormat::Euroc) => trajectory(args, &run, format_euroc, is_own_euroc, console),
         (None, ExportFormat::Kitti) => kitti(args, &run, console),
-        (None, ExportFormat::Splat) => splats(args, &run, console),
+        (None, ExportFormat::Splat) => splats(args, (&run, simd), console),
         (None, _) => trajectory(args, &run, format_tum, is_own_tum, console),
     }
 }
@@ -102,7 +103,7 @@ fn kitti(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
 }
 
 /// Writes the Gaussians of the map with colours for viewers.
-fn splats(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
+fn splats(args: &Export, (run, simd): (&Run, SimdLevel), console: &Console) -> anyhow::Result<()> {
     let folder = run.folder.display();
     let StoredMap::Gaussians(map) = open::map(run)? else {
         let message =
@@ -118,6 +119,7 @@ fn splats(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
     let out = OutputFile::claim(&args.out, &permission, is_own_splats).or_else(refuse)?;
     let response = camera.inverse_response().or_bad_input("make the run again")?;
     let viewing = for_viewers(
+        simd,
         &map,
         camera.pinhole(),
         &response,
@@ -135,7 +137,12 @@ fn splats(args: &Export, run: &Run, console: &Console) -> anyhow::Result<()> {
 }
 
 /// Writes images, cameras and points.
-fn scene(args: &Export, run: &Run, layout: SceneLayout, console: &Console) -> anyhow::Result<()> {
+fn scene(
+    args: &Export,
+    (run, simd): (&Run, SimdLevel),
+    layout: SceneLayout,
+    console: &Console,
+) -> anyhow::Result<()> {
     let map = if run.folder.join(MAP_FILE).is_file() { Some(open::map(run)?) } else { None };
     let gaussians = map.as_ref().and_then(|map| match map {
         StoredMap::Gaussians(map) => Some(map),
@@ -143,7 +150,7 @@ fn scene(args: &Export, run: &Run, layout: SceneLayout, console: &Console) -> an
     });
     let images = args.images.unwrap_or_default().into();
     let export = SceneExport::new(run, layout, images, gaussians).or_else(advise)?;
-    let dataset = if export.needs_data_set() { Some(data_set(args, run)?) } else { None };
+    let dataset = if export.needs_data_set() { Some(data_set(args, run, simd)?) } else { None };
     let mut folder = claim(args, run, export.names())?;
     let progress = console.progress(export.frames().len(), "exporting");
     let points = export.write(dataset.as_ref(), &mut folder, || progress.inc(1)).or_else(advise)?;
@@ -159,11 +166,11 @@ fn claim(args: &Export, run: &Run, names: impl IntoIterator<Item = String>) -> a
 }
 
 /// The data set that some of the images are in.
-fn data_set(args: &Export, run: &Run) -> anyhow::Result<Dataset> {
+fn data_set(args: &Export, run: &Run, simd: SimdLevel) -> anyhow::Result<Dataset> {
     if args.dataset.is_some() {
-        return open::dataset(&data_set_folder(args, run));
+        return open::dataset(&data_set_folder(args, run), simd);
     }
-    mba_mapper::dataset::open(&data_set_folder(args, run)).map_err(|error| {
+    open::open_with(&data_set_folder(args, run), simd).map_err(|error| {
         let message = format!("the run {} needs its data set: {error}", run.folder.display());
         bad_input(message, "name the place where the data set is now with --dataset")
     })

@@ -5,6 +5,7 @@ use std::path::Path;
 use mba_mapper::dataset::{Dataset, Survey, survey};
 use mba_mapper::evaluation::associate;
 use mba_mapper::self_calibration::{depth_lag, quick_contradictions};
+use mba_tracker::SimdLevel;
 use serde::Serialize;
 
 use super::camera_facts::CameraFacts;
@@ -56,8 +57,8 @@ struct Facts {
 /// # Errors
 /// Bad input when the data set cannot be used, or when no frame of it can be read; a failure when its images hold nothing
 /// that could be tracked. What was found out is printed before.
-pub fn run(args: &Info, console: &Console) -> anyhow::Result<()> {
-    let dataset = open::dataset(&args.dataset)?;
+pub fn run(args: &Info, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
+    let dataset = open::dataset(&args.dataset, simd)?;
     let survey = survey(&dataset, SAMPLED_FRAMES);
     let (unreadable, sampled) = (survey.unreadable.len(), survey.sampled);
     let first = survey.unreadable.first().cloned().unwrap_or_default();

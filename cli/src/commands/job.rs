@@ -5,6 +5,7 @@ use std::path::Path;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::run::{Run, path_of};
 use mba_mapper::submaps::{Job, SubmapError};
+use mba_tracker::SimdLevel;
 
 use super::open;
 use crate::failure::{OrBadInput, bad_input, is_disk_full};
@@ -22,9 +23,9 @@ pub fn open_job(folder: &Path) -> anyhow::Result<Job> {
 ///
 /// # Errors
 /// Bad input with advice.
-pub fn inputs(job: &Job) -> anyhow::Result<(Dataset, Run)> {
+pub fn inputs(job: &Job, simd: SimdLevel) -> anyhow::Result<(Dataset, Run)> {
     let run = open::run(&job.run())?;
-    let dataset = open::with_estimates(open::dataset(&job.dataset())?, &run)?;
+    let dataset = open::with_estimates(open::dataset(&job.dataset(), simd)?, &run)?;
     Ok((dataset, run))
 }
 
@@ -32,14 +33,14 @@ pub fn inputs(job: &Job) -> anyhow::Result<(Dataset, Run)> {
 ///
 /// # Errors
 /// Bad input with advice.
-pub fn dataset_of(run: &Run, instead: Option<&Path>) -> anyhow::Result<Dataset> {
+pub fn dataset_of(run: &Run, instead: Option<&Path>, simd: SimdLevel) -> anyhow::Result<Dataset> {
     let recorded = path_of(&run.summary.settings.dataset);
     let folder = instead.unwrap_or(&recorded);
     if instead.is_none() && !folder.is_dir() {
         let message = format!("the data set {} of the run is not there", folder.display());
         return Err(bad_input(message, "name the folder with --dataset"));
     }
-    open::with_estimates(open::dataset(folder)?, run)
+    open::with_estimates(open::dataset(folder, simd)?, run)
 }
 
 /// The refusal of a job, with advice.

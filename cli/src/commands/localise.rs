@@ -5,7 +5,7 @@ use mba_mapper::localisation::{KnownMap, LocaliseError, localise};
 use mba_mapper::map::StoredMap;
 use mba_mapper::run::{Merit, Run, RunWriter, Summary, plausibility};
 use mba_mapper::tracking::{TrackingOptions, tracker_config};
-use mba_tracker::TrackerConfig;
+use mba_tracker::{SimdLevel, TrackerConfig};
 use serde_json::json;
 
 use super::{calibrate, open, outcome};
@@ -20,14 +20,14 @@ use crate::written_run::{self, CAMERA_HINT, absolute, announce, claim};
 ///
 /// # Errors
 /// Bad input when map or recording cannot be used; failure when no frame is found or the results cannot be written.
-pub fn run(args: &Localise, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Localise, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
     let map = open::map(&run)?;
     if map.is_empty() {
         let message = format!("the map of {} is empty", run.folder.display());
         return Err(bad_input(message, "`mba map` makes one from the data set and a tracked run"));
     }
-    let dataset = open::dataset(&args.recording)?;
+    let dataset = open::dataset(&args.recording, simd)?;
     let dataset = calibrate::completed(dataset, args.self_calibrate, console)?;
     let config = tracker_config(&dataset, &TrackingOptions::default());
     config.validate().or_bad_input(CAMERA_HINT)?;

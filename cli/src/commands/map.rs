@@ -6,6 +6,7 @@ use mba_mapper::checkpoint::CheckpointError;
 use mba_mapper::dataset::Dataset;
 use mba_mapper::mapping::{MapError, MapProgress, MapSettings, map_dataset};
 use mba_mapper::run::{Run, RunSettings, Summary};
+use mba_tracker::SimdLevel;
 use serde_json::json;
 
 use super::{calibrate, open};
@@ -23,11 +24,11 @@ pub(super) const PROGRESS_STEPS: usize = 1000;
 ///
 /// # Errors
 /// Bad input when data set, run or checkpoint cannot be used; failure when the results cannot be written.
-pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Map, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let missing = || bad_input("--trajectory and --out are needed", "see `mba map --help`");
     let trajectory = args.trajectory.as_deref().ok_or_else(missing)?;
     let out = args.out.as_deref().ok_or_else(missing)?;
-    let dataset = open::dataset(&args.dataset)?;
+    let dataset = open::dataset(&args.dataset, simd)?;
     let run = open::run(trajectory)?;
     let dataset = open::with_estimates(dataset, &run)?;
     let how = (args.force, Resumption::Option(args.resume));

@@ -9,6 +9,8 @@ use mba_mapper::mapping::{MapError, MapProgress};
 use mba_mapper::submaps::{
     GroupState, Job, JobStatus, SubmapError, Worked, estimated_memory_bytes, map_submap,
 };
+use mba_tracker::SimdLevel;
+use mba_tracker::simd::level_name;
 use serde_json::json;
 
 use super::map::{self, PROGRESS_STEPS, advise};
@@ -32,11 +34,11 @@ const MEMORY_SHARE: f64 = 0.8;
 ///
 /// # Errors
 /// As [`map::run`], [`submap`] and [`all`].
-pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Map, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     match (args.work.submap, args.work.jobs) {
-        (Some(k), _) => submap(args, k, console),
-        (None, Some(jobs)) => all(args, jobs.get().into(), console),
-        (None, None) => map::run(args, console),
+        (Some(k), _) => submap(args, k, simd, console),
+        (None, Some(jobs)) => all(args, jobs.get().into(), simd, console),
+        (None, None) => map::run(args, simd, console),
     }
 }
 
@@ -44,9 +46,9 @@ pub fn run(args: &Map, console: &Console) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// Bad input when the job cannot be used; exit code 75 after a signal; failure when the results cannot be written.
-pub fn submap(args: &Map, k: usize, console: &Console) -> anyhow::Result<()> {
+pub fn submap(args: &Map, k: usize, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let job = job::open_job(&args.dataset)?;
-    let (dataset, run) = job::inputs(&job)?;
+    let (dataset, run) = job::inputs(&job, simd)?;
     let _saving = interrupt::saving();
     let progress = console.progress(PROGRESS_STEPS, "mapping");
     let observe = |at: MapProgress| {
@@ -82,9 +84,9 @@ pub fn submap(args: &Map, k: usize, console: &Console) -> anyhow::Result<()> {
 ///
 /// # Errors
 /// As [`submap`]; the first group that failed is named.
-pub fn all(args: &Map, most: usize, console: &Console) -> anyhow::Result<()> {
+pub fn all(args: &Map, most: usize, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let job = job::open_job(&args.dataset)?;
-    let (dataset, _) = job::inputs(&job)?;
+    let (dataset, _) = job::inputs(&job, simd)?;
     let camera = dataset.calibration().camera;
     let most = fitting(&job, camera.width * camera.height, most, console);
     let waiting = JobStatus::of(&job).groups.into_iter().filter(|group| group.state != GroupState::Done);
@@ -98,7 +100,7 @@ pub fn all(args: &Map, most: usize, console: &Console) -> anyhow::Result<()> {
         while workers.running.len() < most
             && let Some(group) = waiting.pop()
         {
-            let child = start(&job.folder, group, threads, args.mapping.checkpoint_interval)?;
+            let child = start(&job.folder, group, (threads, simd), args.mapping.checkpoint_interval)?;
             workers.running.push((group, child));
         }
         sleep(LOOK_EVERY);
@@ -160,10 +162,15 @@ fn free_memory_bytes() -> Option<u64> {
 }
 
 /// Starts the process of one group.
-fn start(job: &Path, group: usize, threads: usize, interval: Duration) -> anyhow::Result<Child> {
+fn start(
+    job: &Path,
+    group: usize,
+    (threads, simd): (usize, SimdLevel),
+    interval: Duration,
+) -> anyhow::Result<Child> {
     let mut command = itself::command()?;
     command.arg("map").arg(job).args(["--submap", &group.to_string(), "--quiet"]);
-    command.args(["--threads", &threads.to_string()]);
+    command.args(["--threads", &threads.to_string(), "--simd", level_name(simd)]);
     command.args(["--checkpoint-interval", &interval.as_secs_f64().to_string()]);
     Ok(command.stdin(Stdio::null()).stdout(Stdio::null()).spawn()?)
 }

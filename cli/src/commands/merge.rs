@@ -2,6 +2,7 @@
 
 use mba_mapper::mapping::MapError;
 use mba_mapper::submaps::{MergeReport, MergeSettings, SubmapError, merge};
+use mba_tracker::SimdLevel;
 use serde_json::json;
 
 use super::{calibrate, job};
@@ -16,9 +17,9 @@ use crate::written_run::{self, absolute, announce, claim};
 ///
 /// # Errors
 /// Bad input when a group cannot be used; failure when the results cannot be written.
-pub fn run(args: &Merge, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Merge, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let job = job::open_job(&args.job)?;
-    let (dataset, run) = job::inputs(&job)?;
+    let (dataset, run) = job::inputs(&job, simd)?;
     let _saving = interrupt::saving();
     let folder = claim(&args.out, args.force, &[dataset.folder(), &run.folder, &args.job])?;
     let values = json!({

@@ -11,6 +11,7 @@ use mba_mapper::run::{FrameStatus, Run, path_of};
 use mba_mapper::surfaces::{
     ColouredDepth, FusionSettings, MapViews, SurfaceError, Trim, ViewSource, passes, surface_of_map,
 };
+use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use serde::Serialize;
 
@@ -41,7 +42,7 @@ struct Written {
 /// # Errors
 /// Bad input when run, map or trajectory cannot be used or the voxels are too small; failure when the mesh cannot be
 /// written.
-pub fn run(args: &MeshArgs, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &MeshArgs, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let start = Instant::now();
     let run = open::run(&args.run)?;
     let (out, format) = output(args, &run)?;
@@ -52,10 +53,10 @@ pub fn run(args: &MeshArgs, console: &Console) -> anyhow::Result<()> {
     let views = poses.len();
     let alignment = args.align.as_ref().map(|file| align(&run, file, args.max_dt)).transpose()?;
     let progress = console.progress(passes(map) * views, "surface");
-    let mut source = Watched { views: MapViews::new(map, camera, poses), progress };
+    let mut source = Watched { views: MapViews::new(simd, map, camera, poses), progress };
     let settings = FusionSettings { voxel: 0.01 * args.voxel_cm, ..FusionSettings::default() };
     let trim = Trim { least_area: 1e-4 * args.least_area_cm2 };
-    let mut mesh = surface_of_map(map, &mut source, &settings, &trim)
+    let mut mesh = surface_of_map(simd, map, &mut source, &settings, &trim)
         .map_err(|error| (hint(&error), error))
         .or_else(|(hint, error)| Err(error).or_bad_content(&run.folder, hint))?;
     source.progress.finish_and_clear();

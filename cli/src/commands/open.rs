@@ -3,21 +3,30 @@
 use std::borrow::Cow;
 use std::path::Path;
 
-use mba_mapper::dataset::{self, Dataset, DatasetError};
+use mba_mapper::dataset::{self, Dataset, DatasetError, OpenOptions};
 use mba_mapper::import::Source;
 use mba_mapper::map::{FIELD_FILE, MAP_FILE, StoredMap};
 use mba_mapper::run::{Run, RunError, path_of};
 use mba_mapper::self_calibration::read_back;
+use mba_tracker::SimdLevel;
 
 use crate::console::Console;
 use crate::failure::{OrBadInput, bad_input};
 
-/// Opens a data set.
+/// Opens a data set, to be worked on with the instructions `simd`.
 ///
 /// # Errors
 /// Bad input with advice.
-pub fn dataset(folder: &Path) -> anyhow::Result<Dataset> {
-    dataset::open(folder).map_err(|error| (import_hint(folder, &error), error)).or_else(advise)
+pub fn dataset(folder: &Path, simd: SimdLevel) -> anyhow::Result<Dataset> {
+    open_with(folder, simd).map_err(|error| (import_hint(folder, &error), error)).or_else(advise)
+}
+
+/// Opens a data set, to be worked on with the instructions `simd`; without advice.
+///
+/// # Errors
+/// As [`dataset::open`].
+pub fn open_with(folder: &Path, simd: SimdLevel) -> Result<Dataset, DatasetError> {
+    dataset::open_with(folder, &OpenOptions { simd, ..OpenOptions::default() })
 }
 
 /// What to do about something that is no data set but may become one, or else about a data set that cannot be used.
@@ -52,12 +61,13 @@ pub fn run(folder: &Path) -> anyhow::Result<Run> {
 pub fn dataset_if_there(
     run: &Run,
     folder: Option<&Path>,
+    simd: SimdLevel,
     console: &Console,
 ) -> anyhow::Result<Option<Dataset>> {
     if let Some(folder) = folder {
-        return dataset(folder).map(Some);
+        return dataset(folder, simd).map(Some);
     }
-    let opened = dataset::open(&path_of(&run.summary.settings.dataset));
+    let opened = open_with(&path_of(&run.summary.settings.dataset), simd);
     if let Err(error) = &opened {
         let hint = "--dataset names another place";
         console.warning(format!("there are no captured images and no truth to show, {error}; {hint}"));

@@ -9,6 +9,7 @@ use mba_mapper::output::{Permission, ViewFolder};
 use mba_mapper::rendering::{Behind, RenderedView, ViewRenderer};
 use mba_mapper::run::{Run, RunCamera, Spread, path_of};
 use mba_mapper::trajectory_file::{TimedPose, read_trajectory};
+use mba_tracker::SimdLevel;
 use serde::Serialize;
 
 use super::alignment::{AlignmentFigures, align};
@@ -39,7 +40,7 @@ struct Written {
 ///
 /// # Errors
 /// Bad input when run, poses or camera cannot be used; failure when the images cannot be written.
-pub fn run(args: &Render, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Render, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
     let map = open::map(&run)?;
     let camera = camera(&run, args)?;
@@ -56,7 +57,7 @@ pub fn run(args: &Render, console: &Console) -> anyhow::Result<()> {
     let inputs = [&*path_of(&run.summary.settings.dataset), &run.folder];
     let permission = Permission { force: args.force, inputs: &inputs };
     let folder = ViewFolder::claim(&args.out, &permission, names).or_else(refuse)?;
-    let written = render_all(&map, &camera, &poses, (args, &folder), console)?;
+    let written = render_all((&map, simd), &camera, &poses, (args, &folder), console)?;
     folder.finish().or_else(refuse)?;
     console.result(&Written { alignment: alignment.as_ref().map(AlignmentFigures::from), ..written }, table)
 }
@@ -98,14 +99,14 @@ fn in_map_frame(poses: &[TimedPose], alignment: Option<&PoseAlignment>) -> Vec<T
 }
 
 fn render_all(
-    map: &StoredMap,
+    (map, simd): (&StoredMap, SimdLevel),
     camera: &RunCamera,
     poses: &[TimedPose],
     (args, folder): (&Render, &ViewFolder),
     console: &Console,
 ) -> anyhow::Result<Written> {
     let mut renderer =
-        ViewRenderer::new(map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
+        ViewRenderer::new(simd, map, camera.pinhole(), &camera.inverse_response()?, camera.depth_scale);
     let progress = console.progress(poses.len(), "rendering");
     let behind = if args.fill == Switch::On { Behind::Surroundings } else { Behind::Black };
     let mut times = Vec::with_capacity(poses.len());

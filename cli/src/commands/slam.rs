@@ -8,6 +8,7 @@ use mba_mapper::mapping::MapError;
 use mba_mapper::run::{RunError, RunSettings, Summary};
 use mba_mapper::slam::{SlamError, SlamProgress, SlamSettings, run_slam};
 use mba_mapper::tracking::TrackingError;
+use mba_tracker::SimdLevel;
 use serde_json::json;
 
 use super::{calibrate, open, outcome};
@@ -25,8 +26,8 @@ const REFINEMENT_STEPS: u64 = 1000;
 ///
 /// # Errors
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
-pub fn run(args: &Slam, console: &Console) -> anyhow::Result<()> {
-    let dataset = open::dataset(&args.dataset)?;
+pub fn run(args: &Slam, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
+    let dataset = open::dataset(&args.dataset, simd)?;
     let dataset = calibrate::completed(dataset, args.slamming.self_calibrate, console)?;
     let resumption = if args.slamming.realtime { Resumption::Never } else { Resumption::Option(args.resume) };
     let how = (args.force, resumption);

@@ -2,6 +2,7 @@
 
 use mba_mapper::output::{OutputFolder, Permission};
 use mba_mapper::submaps::{JobStatus, SplitSettings, estimated_memory_bytes, split_run};
+use mba_tracker::SimdLevel;
 
 use super::status::table;
 use super::{job, open};
@@ -13,9 +14,9 @@ use crate::written_run::{note_written, refuse};
 ///
 /// # Errors
 /// Bad input when run or data set cannot be used; failure when the plan cannot be written.
-pub fn run(args: &Split, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Split, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
-    let dataset = job::dataset_of(&run, args.dataset.as_deref())?;
+    let dataset = job::dataset_of(&run, args.dataset.as_deref(), simd)?;
     let inputs = [dataset.folder(), run.folder.as_path()];
     let permission = Permission { force: args.force, inputs: &inputs };
     let out = OutputFolder::for_job(&args.out, &permission).or_else(refuse)?;

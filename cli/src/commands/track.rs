@@ -14,6 +14,7 @@ use mba_mapper::tracking::{
     Tracked, TrackingCheckpoint, TrackingError, TrackingOptions, track_and_keep, tracker_config,
     upright_world,
 };
+use mba_tracker::SimdLevel;
 use nalgebra::UnitVector3;
 use serde_json::json;
 
@@ -32,8 +33,8 @@ const CHECKPOINT_HINT: &str = "start without --resume, or with the data set and 
 ///
 /// # Errors
 /// Bad input when the data set cannot be used; failure when the results cannot be written.
-pub fn run(args: &Track, console: &Console) -> anyhow::Result<()> {
-    let dataset = open::dataset(&args.dataset)?;
+pub fn run(args: &Track, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
+    let dataset = open::dataset(&args.dataset, simd)?;
     let dataset = calibrate::completed(dataset, args.tracking.self_calibrate, console)?;
     let (how, interval) = ((args.force, Resumption::Option(args.resume)), args.checkpoint_interval);
     let summary = track_into(&dataset, &args.out, how, interval, &args.tracking, console)?;

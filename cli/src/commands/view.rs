@@ -4,6 +4,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use mba_mapper::map::StoredMap;
+use mba_tracker::SimdLevel;
 use serde::Serialize;
 
 use super::open;
@@ -23,7 +24,7 @@ struct Written {
 ///
 /// # Errors
 /// Bad input when the folder is not a run or has no map of Gaussians; failure when the page cannot be written.
-pub fn run(args: &View, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &View, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let run = open::run(&args.run)?;
     let folder = run.folder.display();
     let StoredMap::Gaussians(map) = open::map(&run)? else {
@@ -33,7 +34,7 @@ pub fn run(args: &View, console: &Console) -> anyhow::Result<()> {
     let Some(camera) = &run.summary.settings.camera else {
         return Err(bad_input(format!("{folder} does not tell its camera"), "make the run again"));
     };
-    let dataset = open::dataset_if_there(&run, args.dataset.as_deref(), console)?;
+    let dataset = open::dataset_if_there(&run, args.dataset.as_deref(), simd, console)?;
     let page =
         report::write_view(&run, (&map, camera), dataset.as_ref(), args.force).or_else(advise_report)?;
     if !args.no_open && !open_in_browser(&page) {

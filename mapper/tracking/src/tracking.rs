@@ -13,8 +13,7 @@ use mba_tracker::geometry::RigidTransform;
 use mba_tracker::image::{ColourView, DepthView, PixelFormat};
 use mba_tracker::trajectory::ExposureTrajectory;
 use mba_tracker::{
-    Doubt, Frame, FrameResult, GyroReading, Readout, ReferenceMode, Revision, SimdLevel, Tracker,
-    TrackerConfig,
+    Doubt, Frame, FrameResult, GyroReading, Readout, ReferenceMode, Revision, Tracker, TrackerConfig,
 };
 
 use crate::run::{FrameRecord, FrameStatus, Reason, RunError, RunWriter};
@@ -142,7 +141,7 @@ pub fn track_and_keep(
     // Without images the size of the camera is a mere claim, for which no memory is taken.
     let has_images = dataset.has_images();
     let mut memory = vec![0; if has_images { config.workspace_len() } else { 0 }];
-    let tracker = has_images.then(|| Tracker::new(&config, SimdLevel::new(), &mut memory)).transpose();
+    let tracker = has_images.then(|| Tracker::new(&config, dataset.simd(), &mut memory)).transpose();
     let mut tracker = tracker.map_err(TrackingError::Camera)?;
     let mut uncertainty = Uncertainty::default();
     let first = match (&mut checkpoint, &mut tracker) {

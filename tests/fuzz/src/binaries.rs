@@ -9,6 +9,7 @@ use mba_mapper::mesh::{depth_image, format_mesh, parse_mesh};
 use mba_mapper::rendering::{Behind, ViewRenderer};
 use mba_mapper::surfaces::sample_surface;
 use mba_mapper::triplane::read_field;
+use mba_tracker::SimdLevel;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::photometric::InverseResponse;
 
@@ -32,7 +33,7 @@ pub fn gaussians(data: &[u8]) {
 }
 
 fn render(map: &Gaussians) {
-    let mut renderer = ViewRenderer::new(map, CAMERA, &InverseResponse::srgb(), 1000.0);
+    let mut renderer = ViewRenderer::new(SimdLevel::new(), map, CAMERA, &InverseResponse::srgb(), 1000.0);
     let view = renderer.render(&RigidTransform::identity(), Behind::Surroundings);
     assert!((0.0..=1.0).contains(&view.solid), "{}", view.solid);
 }
@@ -67,7 +68,8 @@ pub fn field(data: &[u8]) {
             let path = place.write("map.mbaf", &bytes);
             let Ok(field) = read_field(&path) else { return };
             assert!(field.bytes() <= 8 * bytes.len() + (1 << 20));
-            let mut renderer = ViewRenderer::new(&field, CAMERA, &InverseResponse::srgb(), 1000.0);
+            let mut renderer =
+                ViewRenderer::new(SimdLevel::new(), &field, CAMERA, &InverseResponse::srgb(), 1000.0);
             let _ = renderer.render(&RigidTransform::identity(), Behind::Black);
         },
     );

@@ -22,9 +22,9 @@ use super::numbers::Numbers;
 use super::place::{Kept, in_place};
 
 /// Bytes of the header up to the length of the payload, and all of it.
-const LENGTH_AT: usize = 44;
+const LENGTH_AT: usize = 52;
 const IDENTITY_AT: usize = 12;
-const HEADER_LEN: usize = 56;
+const HEADER_LEN: usize = 64;
 
 /// Makes length and checksum in the header right.
 fn repair(file: &mut [u8]) {
@@ -43,7 +43,7 @@ pub fn checkpoint(data: &[u8]) {
         &KEPT,
         |_| (),
         |place| {
-            let mut file = b"MBACKPT\n\x01\0\0\0".to_vec();
+            let mut file = b"MBACKPT\n\x02\0\0\0".to_vec();
             file.resize(HEADER_LEN, 0);
             file.extend(data);
             repair(&mut file);

@@ -20,6 +20,7 @@ mod real_camera;
 mod render;
 mod sensors;
 mod shell;
+mod simd;
 mod slam;
 #[cfg(unix)]
 mod submaps;

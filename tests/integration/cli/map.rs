@@ -23,7 +23,7 @@ fn sequence() -> BlurredSequence {
 }
 
 /// Arguments of `mba map` from `data` and `run` into `out`, all in `folder`.
-fn arguments(folder: &Path, out: &str, options: &[&str]) -> Vec<OsString> {
+pub(super) fn arguments(folder: &Path, out: &str, options: &[&str]) -> Vec<OsString> {
     let [data, run, out] = ["data", "run", out].map(|name| folder.join(name).into_os_string());
     let fixed = ["map".into(), data, "--trajectory".into(), run, "--out".into(), out, "--json".into()];
     fixed.into_iter().chain(options.iter().map(|option| option.into())).collect()
@@ -34,7 +34,7 @@ fn map(folder: &Path, out: &str, options: &[&str]) -> Outcome {
 }
 
 /// Starts `mba map` and kills it as soon as it has written a checkpoint and `later` has passed.
-fn kill(folder: &Path, out: &str, options: &[&str], later: Duration) {
+pub(super) fn kill(folder: &Path, out: &str, options: &[&str], later: Duration) {
     let mut program = Command::new(env!("CARGO_BIN_EXE_mba-under-test"));
     let program = program.args(arguments(folder, out, options)).stdout(Stdio::null()).stderr(Stdio::null());
     // Results depend on how many threads there are as little as on interruptions.

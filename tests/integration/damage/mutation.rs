@@ -157,14 +157,14 @@ fn flipped(good: &[u8], seed: u32) -> Vec<u8> {
 }
 
 /// Index of the first line with a number that is no comment.
-/// A checkpoint with other content and the checksum of that: its header has 56 bytes, of which the last twelve are the
+/// A checkpoint with other content and the checksum of that: its header has 64 bytes, of which the last twelve are the
 /// length of what follows and the checksum.
 fn forged(good: &[u8], seed: u32) -> Vec<u8> {
-    let (header, content) = good.split_at(56.min(good.len()));
+    let (header, content) = good.split_at(64.min(good.len()));
     let mut bytes = [header, &flipped(content, seed)].concat();
-    if bytes.len() > 56 {
-        let checksum = crc32fast::hash(&[&bytes[12..52], &bytes[56..]].concat());
-        bytes[52..56].copy_from_slice(&checksum.to_le_bytes());
+    if bytes.len() > 64 {
+        let checksum = crc32fast::hash(&[&bytes[12..60], &bytes[64..]].concat());
+        bytes[60..64].copy_from_slice(&checksum.to_le_bytes());
     }
     bytes
 }

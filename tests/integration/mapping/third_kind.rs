@@ -159,9 +159,9 @@ fn a_box_of_one_colour_is_fitted_rendered_and_meshed() {
         RigidTransform::new(nalgebra::UnitQuaternion::from_scaled_axis(turn), Vector3::zeros())
     };
     let poses: Vec<RigidTransform> = (0..8).map(turned).collect();
-    let mut views = MapViews::new(map.scene(), CAMERA, poses);
+    let mut views = MapViews::new(Level::new(), map.scene(), CAMERA, poses);
     let fusion = FusionSettings { voxel: 0.05, ..FusionSettings::default() };
-    let mesh = surface_of_map(map.scene(), &mut views, &fusion, &Trim { least_area: 0.01 })
+    let mesh = surface_of_map(Level::new(), map.scene(), &mut views, &fusion, &Trim { least_area: 0.01 })
         .expect("the box has a surface");
     assert!(mesh.area() > 12.0, "{} square metres", mesh.area());
     let off_the_walls = |vertex: &[f32; 3]| {

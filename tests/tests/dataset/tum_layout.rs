@@ -48,7 +48,7 @@ fn lists_are_associated_one_to_one_and_leftovers_are_reported() {
             "depth.txt: 1 images have no partner within 0.02 s and are left out, first at 1.9",
         ]
     );
-    let strict = OpenOptions { association_tolerance: 0.001 };
+    let strict = OpenOptions { association_tolerance: 0.001, ..OpenOptions::default() };
     let error = dataset::open_with(&folder.path, &strict).unwrap_err();
     assert_eq!(
         folder.shortened(&error),

@@ -3,6 +3,8 @@
 mod slam;
 mod tracker;
 
+use mba_tracker::SimdLevel;
+
 use super::repeats::Repeats;
 use super::{calibrate, open};
 use crate::args::Switch;
@@ -13,8 +15,8 @@ use crate::console::Console;
 ///
 /// # Errors
 /// As `mba slam` and `mba track`.
-pub fn run(args: &Ablate, console: &Console) -> anyhow::Result<()> {
-    let dataset = calibrate::completed(open::dataset(&args.dataset)?, Switch::On, console)?;
+pub fn run(args: &Ablate, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
+    let dataset = calibrate::completed(open::dataset(&args.dataset, simd)?, Switch::On, console)?;
     let maps = args.of == Ablated::Slam;
     let repeats = Repeats { dataset: dataset.folder(), maps, out: &args.out, count: args.repeats };
     match args.of {

@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use mba_mapper::dataset::Dataset;
 use mba_mapper::run::Summary;
+use mba_tracker::SimdLevel;
 
 use super::repeats::{self, Repeats, nudged};
 use super::{calibrate, open, slam, track};
@@ -29,7 +30,7 @@ const CHECKPOINT_INTERVAL: Duration = Duration::from_secs(20);
 /// # Errors
 /// Bad input when the file cannot be used or none of its sequences is there; failure when a sequence cannot be run, after the
 /// table of the others.
-pub fn run(args: &Bench, console: &Console) -> anyhow::Result<()> {
+pub fn run(args: &Bench, simd: SimdLevel, console: &Console) -> anyhow::Result<()> {
     let benchmark =
         Benchmark::read(&args.file).or_bad_input("`mba bench --help` shows what a benchmark looks like")?;
     let beside = args.file.parent().unwrap_or(Path::new(""));
@@ -47,7 +48,7 @@ pub fn run(args: &Bench, console: &Console) -> anyhow::Result<()> {
     let mut measured = Vec::new();
     let mut failures = Vec::new();
     for sequence in there {
-        match summaries(&benchmark, sequence, data, args, console) {
+        match summaries(&benchmark, sequence, (data, simd), args, console) {
             Ok(summaries) => measured.push(Measured::new(&sequence.name, &summaries)),
             Err(error) if error.is::<Interrupted>() => return Err(error),
             Err(error) => failures.push((sequence.name.clone(), causes(&error))),
@@ -68,11 +69,11 @@ pub fn run(args: &Bench, console: &Console) -> anyhow::Result<()> {
 fn summaries(
     benchmark: &Benchmark,
     sequence: &BenchmarkSequence,
-    data: &Path,
+    (data, simd): (&Path, SimdLevel),
     args: &Bench,
     console: &Console,
 ) -> anyhow::Result<Vec<Summary>> {
-    let dataset = open::dataset(&data.join(&sequence.dataset))?;
+    let dataset = open::dataset(&data.join(&sequence.dataset), simd)?;
     let dataset = calibrate::completed(dataset, Switch::On, console)?;
     let maps = benchmark.of == BenchmarkedCommand::Slam;
     let repeats = Repeats { dataset: dataset.folder(), maps, out: &args.out, count: args.repeats };

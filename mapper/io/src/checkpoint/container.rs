@@ -15,7 +15,7 @@ use crate::whole_file::{read, write_durably};
 const MAGIC: [u8; 8] = *b"MBACKPT\n";
 
 /// Version of the layout.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 const VERSION_AT: usize = MAGIC.len();
 const IDENTITY_AT: usize = VERSION_AT + 4;
@@ -112,6 +112,7 @@ mod tests {
             dataset: part("room"),
             trajectory: part("run"),
             settings: part("default"),
+            simd: part("avx2"),
         }
     }
 
@@ -170,7 +171,7 @@ mod tests {
             let right = match at {
                 ..VERSION_AT => matches!(error, NotACheckpoint { .. }),
                 VERSION_AT..IDENTITY_AT => {
-                    matches!(error, Unsound(BinaryFileError::Version { expected: 1, .. }))
+                    matches!(error, Unsound(BinaryFileError::Version { expected: 2, .. }))
                 }
                 LENGTH_AT..CHECKSUM_AT => matches!(error, Unsound(BinaryFileError::Length { .. })),
                 _ => matches!(error, Unsound(BinaryFileError::Damaged { .. })),
@@ -188,6 +189,7 @@ mod tests {
             (Identity { dataset: other, settings: other, ..identity() }, Difference::Dataset),
             (Identity { trajectory: other, ..identity() }, Difference::Trajectory),
             (Identity { settings: other, ..identity() }, Difference::Settings),
+            (Identity { simd: other, ..identity() }, Difference::Simd),
         ];
         for (identity, expected) in cases {
             let error = load::<Sample>(&path, &identity).unwrap_err();

@@ -2,12 +2,14 @@
 
 use std::fmt;
 
+use mba_tracker::SimdLevel;
+use mba_tracker::simd::level_name;
 use serde::Serialize;
 
 use crate::dataset::Dataset;
 
 /// Length of a stored identity in bytes.
-pub(super) const IDENTITY_LEN: usize = 32;
+pub(super) const IDENTITY_LEN: usize = 40;
 
 /// A 64-bit hash (FNV-1a) that is the same on all machines. It tells mistakes apart, it does not stop forgers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -25,6 +27,12 @@ impl Fingerprint {
     pub fn of_dataset(dataset: &Dataset) -> Self {
         let stamps: Vec<f64> = (0..dataset.len()).map(|index| dataset.timestamp(index)).collect();
         Self::of(&(format!("{:?}", dataset.calibration()), stamps))
+    }
+
+    /// Of the instructions that a run computes with.
+    #[must_use]
+    pub fn of_simd(level: SimdLevel) -> Self {
+        Self::of(level_name(level))
     }
 
     /// Of bytes, e.g. the content of a file.
@@ -53,6 +61,8 @@ pub struct Identity {
     pub trajectory: Fingerprint,
     /// Options that change the result.
     pub settings: Fingerprint,
+    /// The SIMD level: levels differ in the last digits of what they compute.
+    pub simd: Fingerprint,
 }
 
 /// In what a checkpoint belongs to another run.
@@ -67,6 +77,8 @@ pub enum Difference {
     Trajectory,
     /// See [`Identity::settings`].
     Settings,
+    /// See [`Identity::simd`].
+    Simd,
 }
 
 impl fmt::Display for Difference {
@@ -76,6 +88,7 @@ impl fmt::Display for Difference {
             Self::Dataset => "of another data set",
             Self::Trajectory => "of a run that started from another trajectory",
             Self::Settings => "of a run with other settings",
+            Self::Simd => "of a run with another SIMD level, see --simd",
         })
     }
 }
@@ -93,12 +106,18 @@ impl Identity {
     pub(super) fn difference(self, bytes: &[u8; IDENTITY_LEN]) -> Option<Difference> {
         let own = self.to_bytes();
         let different = own.chunks_exact(8).zip(bytes.chunks_exact(8)).position(|(a, b)| a != b)?;
-        let kinds = [Difference::Program, Difference::Dataset, Difference::Trajectory, Difference::Settings];
+        let kinds = [
+            Difference::Program,
+            Difference::Dataset,
+            Difference::Trajectory,
+            Difference::Settings,
+            Difference::Simd,
+        ];
         kinds.get(different).copied()
     }
 
-    fn parts(self) -> [u64; 4] {
-        [self.program.0, self.dataset.0, self.trajectory.0, self.settings.0]
+    fn parts(self) -> [u64; 5] {
+        [self.program.0, self.dataset.0, self.trajectory.0, self.settings.0, self.simd.0]
     }
 }
 

@@ -5,8 +5,8 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | `MBACKPT` and a line feed |
-//! | 4 | version of this layout, now 1 |
-//! | 32 | [`Identity`] of the run: fingerprints of program, data set, trajectory and settings |
+//! | 4 | version of this layout, now 2 |
+//! | 40 | [`Identity`] of the run: fingerprints of program, data set, trajectory, settings and SIMD level |
 //! | 8 | length of the payload |
 //! | 4 | CRC-32 (IEEE) of identity, length and payload |
 //! | | payload: the value in the postcard format |

@@ -45,12 +45,12 @@ impl DepthView {
     }
 
     /// The depth that the colour camera sees, of a stored image of `size` (width, height), raw units.
-    pub(super) fn seen(&self, stored: Vec<u16>, size: (usize, usize)) -> Vec<u16> {
+    pub(super) fn seen(&self, simd: SimdLevel, stored: Vec<u16>, size: (usize, usize)) -> Vec<u16> {
         match self {
             Self::Stored => stored,
-            Self::Nearest(map) => nearest(&stored, size, map),
+            Self::Nearest(map) => nearest(simd, &stored, size, map),
             Self::Interpolated(map) => map.iter().map(|at| interpolate(&stored, size, *at)).collect(),
-            Self::Moved(view) => view.seen(stored),
+            Self::Moved(view) => view.seen(simd, stored),
         }
     }
 }
@@ -67,9 +67,14 @@ fn source_map(
     map
 }
 
-fn nearest(stored: &[u16], (width, height): (usize, usize), map: &[SourcePosition]) -> Vec<u16> {
+fn nearest(
+    simd: SimdLevel,
+    stored: &[u16],
+    (width, height): (usize, usize),
+    map: &[SourcePosition],
+) -> Vec<u16> {
     let mut target = vec![0; map.len()];
-    let mapped = remap_nearest(SimdLevel::new(), stored, width, height, map, &mut target);
+    let mapped = remap_nearest(simd, stored, width, height, map, &mut target);
     debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
     target
 }
@@ -111,10 +116,10 @@ pub(super) struct MovedView {
 
 impl MovedView {
     /// Every depth pixel as a square that faces the depth camera; the nearest one counts where several cover a pixel.
-    fn seen(&self, stored: Vec<u16>) -> Vec<u16> {
+    fn seen(&self, simd: SimdLevel, stored: Vec<u16>) -> Vec<u16> {
         let size = (self.depth.width, self.depth.height);
         let stored = match &self.undistorted {
-            Some(map) => nearest(&stored, size, map),
+            Some(map) => nearest(simd, &stored, size, map),
             None => stored,
         };
         let mut target = vec![0_u16; self.colour.width * self.colour.height];
@@ -188,7 +193,7 @@ mod tests {
         let mut stored: Vec<u16> =
             (0..48).map(|index| inverse(f64::from(index % 8)).recip().round() as u16).collect();
         let view = DepthView::of(&depth, &colour, 1000.0);
-        let seen = view.seen(stored.clone(), (8, 6));
+        let seen = view.seen(SimdLevel::new(), stored.clone(), (8, 6));
         // Column 5 of colour is column 2.25 of depth.
         assert!((f64::from(seen[16 * 5 + 5]) - inverse(2.25).recip()).abs() <= 1.0);
         // Half a depth pixel at the border lies outside of all centres.
@@ -196,7 +201,7 @@ mod tests {
         // A step to twice the depth, and a hole.
         (0..6).for_each(|row| stored[8 * row + 3] = 4000);
         stored[8 * 2 + 5] = 0;
-        let seen = view.seen(stored, (8, 6));
+        let seen = view.seen(SimdLevel::new(), stored, (8, 6));
         assert_eq!((seen[16 * 5 + 6], seen[16 * 5 + 7]), (4000, 4000), "columns 2.75 and 3.25");
         assert_eq!(seen[16 * 5 + 11], 0, "column 5.25 of row 2.25");
     }
@@ -214,7 +219,7 @@ mod tests {
         let mut stored = vec![3000_u16; 40 * 30];
         // 3 px of parallax at 1 m, 1 px at 3 m.
         stored[15 * 40 + 20] = 1000;
-        let seen = view.seen(stored, (40, 30));
+        let seen = view.seen(SimdLevel::new(), stored, (40, 30));
         assert_eq!(seen[15 * 40 + 23], 1000);
         assert_eq!(seen[15 * 40 + 22], 3000);
         assert_eq!(seen[15 * 40 + 21], 0, "what only the colour camera sees behind the near point");

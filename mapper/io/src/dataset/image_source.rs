@@ -43,20 +43,20 @@ impl ColourSource {
         self.map.as_ref().map_or(whole, |map| region_with_source(map, camera.width))
     }
 
-    pub(super) fn undistort(&self, stored: Vec<u8>) -> Vec<u8> {
+    pub(super) fn undistort(&self, simd: SimdLevel, stored: Vec<u8>) -> Vec<u8> {
         let Some(map) = &self.map else { return stored };
         let mut target = vec![[0; 3]; map.len()];
         let (pixels, _) = stored.as_chunks::<3>();
-        let mapped = remap_bilinear(SimdLevel::new(), pixels, self.size.0, self.size.1, map, &mut target);
+        let mapped = remap_bilinear(simd, pixels, self.size.0, self.size.1, map, &mut target);
         debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
         target.into_flattened()
     }
 
     /// Which pixels of the frame are used, of a stored mask.
-    pub(super) fn undistort_mask(&self, stored: Vec<u16>) -> Vec<u16> {
+    pub(super) fn undistort_mask(&self, simd: SimdLevel, stored: Vec<u16>) -> Vec<u16> {
         let Some(map) = &self.map else { return stored };
         let mut target = vec![0; map.len()];
-        let mapped = remap_nearest(SimdLevel::new(), &stored, self.size.0, self.size.1, map, &mut target);
+        let mapped = remap_nearest(simd, &stored, self.size.0, self.size.1, map, &mut target);
         debug_assert_eq!(mapped, Ok(()), "the decoder checked the size");
         target
     }
@@ -75,8 +75,8 @@ impl DepthSource {
     }
 
     /// The depth of the frame's pixels.
-    pub(super) fn seen(&self, stored: Vec<u16>) -> Vec<u16> {
-        self.view.seen(stored, self.size)
+    pub(super) fn seen(&self, simd: SimdLevel, stored: Vec<u16>) -> Vec<u16> {
+        self.view.seen(simd, stored, self.size)
     }
 }
 

@@ -100,7 +100,7 @@ pub fn open_with(folder: &Path, options: &OpenOptions) -> Result<Dataset, Datase
     } else {
         return Err(DatasetError::UnknownLayout { folder: folder.to_owned() });
     };
-    Dataset::new(folder, contents)
+    Dataset::new(folder, contents, options.simd)
 }
 
 /// Reads a calibration file by itself, without exposure times of its frames.

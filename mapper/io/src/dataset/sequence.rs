@@ -4,6 +4,7 @@ mod oddities;
 
 use std::path::{Path, PathBuf};
 
+use mba_tracker::SimdLevel;
 use mba_tracker::geometry::PinholeCamera;
 use mba_tracker::image::PixelRectangle;
 use mba_tracker::photometric::{Vignetting, radius_squared};
@@ -39,6 +40,7 @@ pub struct Dataset {
     depth: DepthSource,
     usable: UsableDepth,
     region: PixelRectangle,
+    simd: SimdLevel,
 }
 
 /// Where one frame is stored.
@@ -67,7 +69,7 @@ pub(super) struct Contents {
 
 impl Dataset {
     /// Prepares undistortion and checks what can be checked without decoding images.
-    pub(super) fn new(folder: &Path, contents: Contents) -> Result<Self, DatasetError> {
+    pub(super) fn new(folder: &Path, contents: Contents, simd: SimdLevel) -> Result<Self, DatasetError> {
         let Contents { calibration, colour_camera, entries, ground_truth, ground_truth_exposures, warnings } =
             contents;
         check_unit(folder, &entries, calibration.frame_rate)?;
@@ -94,6 +96,7 @@ impl Dataset {
             depth,
             usable: UsableDepth::of(folder),
             region,
+            simd,
         };
         dataset.collect_warnings();
         Ok(dataset)
@@ -130,7 +133,7 @@ impl Dataset {
             ground_truth_exposures: self.ground_truth_exposures,
             warnings: self.reader_warnings,
         };
-        Self::new(&self.folder, contents)
+        Self::new(&self.folder, contents, self.simd)
     }
 
     /// Replaces the exposure times of all frames by estimates, seconds, one for each frame.
@@ -182,6 +185,13 @@ impl Dataset {
     #[must_use]
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
+    }
+
+    /// The instructions that the data set was opened for. Its images are resampled with them, and what tracks or maps it takes
+    /// them from here: so one run has one level. Levels differ in the last digits of what they compute.
+    #[must_use]
+    pub fn simd(&self) -> SimdLevel {
+        self.simd
     }
 
     /// The camera of the stored colour images: that of the calibration, unless frames are those of another one.
@@ -263,7 +273,7 @@ impl Dataset {
     pub fn frame(&self, index: usize) -> Result<RgbdFrame, FrameReadError> {
         let len = self.entries.len();
         let entry = self.entries.get(index).ok_or(FrameReadError::IndexOutOfRange { index, len })?;
-        let rgb = self.colour.undistort(read_colour(&entry.colour, self.colour.size)?);
+        let rgb = self.colour.undistort(self.simd, read_colour(&entry.colour, self.colour.size)?);
         let depth = self.frame_depth(entry)?;
         check_is_there(self.colour.is_there, &entry.colour)?;
         check_is_there(self.depth.is_there, &entry.depth)?;
@@ -283,9 +293,9 @@ impl Dataset {
     fn frame_depth(&self, entry: &FrameEntry) -> Result<Vec<u16>, FrameReadError> {
         let mut stored = read_depth(&entry.depth, self.depth.size)?;
         self.usable.remove_unsure(&mut stored, &entry.depth, self.depth.size)?;
-        let mut depth = self.depth.seen(stored);
+        let mut depth = self.depth.seen(self.simd, stored);
         if let Some(mask) = self.usable.mask(&entry.colour, self.colour.size)? {
-            let mask = self.colour.undistort_mask(mask);
+            let mask = self.colour.undistort_mask(self.simd, mask);
             depth.iter_mut().zip(mask).for_each(|(depth, is_used)| *depth *= is_used);
         }
         Ok(depth)

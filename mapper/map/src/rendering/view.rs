@@ -62,9 +62,11 @@ pub struct RenderedView {
 }
 
 impl<'a> ViewRenderer<'a> {
-    /// Renders `map` as `camera` with that response sees it; depth gets `depth_scale` units per metre.
+    /// Renders `map` as `camera` with that response sees it, with the instructions `simd`; depth gets `depth_scale` units per
+    /// metre.
     #[must_use]
     pub fn new(
+        simd: SimdLevel,
         map: impl Into<Scene<'a>>,
         camera: PinholeCamera,
         response: &InverseResponse,
@@ -77,7 +79,7 @@ impl<'a> ViewRenderer<'a> {
             response: ForwardResponse::new(response),
             inverse: response.clone(),
             falloff: None,
-            renderer: SceneRenderer::new(SimdLevel::new()),
+            renderer: SceneRenderer::new(simd),
         }
     }
 
@@ -191,7 +193,8 @@ mod tests {
         };
         let map: Gaussians = [ball].into_iter().collect();
         let camera = PinholeCamera { width: 33, height: 25, fx: 100.0, fy: 100.0, cx: 16.0, cy: 12.0 };
-        let mut renderer = ViewRenderer::new(&map, camera, &InverseResponse::srgb(), depth_scale);
+        let mut renderer =
+            ViewRenderer::new(SimdLevel::new(), &map, camera, &InverseResponse::srgb(), depth_scale);
         renderer.render(&RigidTransform::identity(), Behind::Black)
     }
 
@@ -240,7 +243,8 @@ mod tests {
             colour: [0.5; 3],
         };
         let map: Gaussians = [ball].into_iter().collect();
-        let mut renderer = ViewRenderer::new(&map, camera, &InverseResponse::linear(), 5000.0);
+        let mut renderer =
+            ViewRenderer::new(SimdLevel::new(), &map, camera, &InverseResponse::linear(), 5000.0);
         let pose = RigidTransform::identity();
         let captured = [const { 90 }; 3].map(|byte| vec![byte; width * height]);
         let [black, filled, in_front] =

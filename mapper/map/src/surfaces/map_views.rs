@@ -20,10 +20,15 @@ pub struct MapViews<'a> {
 }
 
 impl<'a> MapViews<'a> {
-    /// Views by `camera` from `poses` (world from camera).
+    /// Views by `camera` from `poses` (world from camera), rendered with the instructions `simd`.
     #[must_use]
-    pub fn new(map: impl Into<Scene<'a>>, camera: PinholeCamera, poses: Vec<RigidTransform>) -> Self {
-        Self { map: map.into(), camera, poses, renderer: SceneRenderer::new(SimdLevel::new()) }
+    pub fn new(
+        simd: SimdLevel,
+        map: impl Into<Scene<'a>>,
+        camera: PinholeCamera,
+        poses: Vec<RigidTransform>,
+    ) -> Self {
+        Self { map: map.into(), camera, poses, renderer: SceneRenderer::new(simd) }
     }
 }
 

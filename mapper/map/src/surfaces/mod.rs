@@ -25,14 +25,18 @@ pub use sight::{Sight, Trim};
 pub use tsdf::{FusionSettings, fuse_views};
 pub use view::{ColouredDepth, ViewSource};
 
+use mba_tracker::SimdLevel;
+
 use crate::map::Scene;
 
 /// The coloured surface of a map that views of it show, with voxels of `settings.voxel`: a field's is where its distance
-/// is zero, that of other maps is fused from the views. Without parts of less than `trim.least_area`.
+/// is zero, that of other maps is fused from the views. Without parts of less than `trim.least_area`. A field is asked with
+/// the instructions `simd`.
 ///
 /// # Errors
 /// See [`fuse_views`] and [`surface_of_field`].
 pub fn surface_of_map(
+    simd: SimdLevel,
     map: Scene<'_>,
     source: &mut dyn ViewSource,
     settings: &FusionSettings,
@@ -40,7 +44,7 @@ pub fn surface_of_map(
 ) -> Result<Mesh, SurfaceError> {
     match map {
         Scene::Gaussians(_) | Scene::Other(_) => surface_of_views(source, settings, trim),
-        Scene::Field(field) => surface_of_field(field, settings.voxel, source, trim),
+        Scene::Field(field) => surface_of_field(simd, field, settings.voxel, source, trim),
     }
 }
 

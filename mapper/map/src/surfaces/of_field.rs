@@ -22,11 +22,12 @@ const FAR: f32 = 0.8;
 const TOLERANCE: f64 = 0.5;
 
 /// The coloured surface of a field where its distance is zero, by marching cubes with voxels of `voxel` metres, trimmed
-/// to what the views of `source` see of it.
+/// to what the views of `source` see of it. The field is asked with the instructions `simd`.
 ///
 /// # Errors
 /// [`SurfaceError`] for voxels that are not positive or too small for the box of the field.
 pub fn surface_of_field(
+    simd: Level,
     field: &TriplaneField,
     voxel: f64,
     source: &mut dyn ViewSource,
@@ -34,22 +35,21 @@ pub fn surface_of_field(
 ) -> Result<Mesh, SurfaceError> {
     let (min, max) = (field.region().origin().into(), field.region().end().into());
     let bounds = FieldBox { min, max, voxel };
-    let level = Level::new();
     // Most of a room is air: distances are asked for near the surface only.
-    let near = NearSurface::new(field, &bounds, level)?;
+    let near = NearSurface::new(field, &bounds, simd)?;
     let response = ForwardResponse::new(&InverseResponse::srgb());
     let distances = |points: &[[f32; 3]], out: &mut [f32]| {
         out.fill(f32::NAN);
         // Points that are far from the surface stay unknown.
         let wanted: Vec<usize> = near.of_row(points).collect();
         let places: Vec<_> = wanted.iter().map(|k| points[*k].map(f64::from)).collect();
-        wanted.iter().zip(field.distances(level, &places)).for_each(|(k, distance)| out[*k] = distance);
+        wanted.iter().zip(field.distances(simd, &places)).for_each(|(k, distance)| out[*k] = distance);
     };
     let colours = |points: &[[f32; 3]], out: &mut [[f32; 3]]| {
         let places: Vec<_> = points.iter().map(|point| point.map(f64::from)).collect();
         // A field has light, a mesh has display values.
         let display = |light: f32| f32::from(response.encode(light)) / 255.0;
-        out.iter_mut().zip(field.colours(level, &places)).for_each(|(out, light)| *out = light.map(display));
+        out.iter_mut().zip(field.colours(simd, &places)).for_each(|(out, light)| *out = light.map(display));
     };
     let mesh = mesh_from_field(&bounds, distances, colours)?;
     let mut sight = Sight::new(&mesh);
@@ -245,8 +245,8 @@ mod tests {
     #[test]
     fn the_wall_is_where_it_was_seen_and_nothing_else_is_kept() {
         let trim = Trim { least_area: 0.0 };
-        let mut views = MapViews::new(&*SEEN, CAMERA, vec![RigidTransform::identity()]);
-        let mesh = surface_of_field(&SEEN, 0.01, &mut views, &trim).unwrap();
+        let mut views = MapViews::new(Level::new(), &*SEEN, CAMERA, vec![RigidTransform::identity()]);
+        let mesh = surface_of_field(Level::new(), &SEEN, 0.01, &mut views, &trim).unwrap();
         // The camera sees 48/40 x 36/40 of the distance, half of a pixel less at each side.
         let expected = f64::from(WALL * WALL) * 48.0 / 40.0 * 36.0 / 40.0;
         assert!((mesh.area() / expected - 1.0).abs() < 0.05, "{} m2 instead of {expected}", mesh.area());
@@ -255,7 +255,13 @@ mod tests {
         let mean = mesh.colours.iter().flatten().map(|byte| f64::from(*byte)).sum::<f64>();
         let mean = mean / (3 * mesh.colours.len()) as f64;
         assert!((mean - 120.0).abs() < 6.0, "mean colour {mean}");
-        let unseen = surface_of_field(&SEEN, 0.01, &mut MapViews::new(&*SEEN, CAMERA, vec![]), &trim);
+        let unseen = surface_of_field(
+            Level::new(),
+            &SEEN,
+            0.01,
+            &mut MapViews::new(Level::new(), &*SEEN, CAMERA, vec![]),
+            &trim,
+        );
         assert!(unseen.unwrap().triangles.is_empty());
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use mba_adjust::deblurring::{DeblurError, DeblurMemory, KeyframeDeblurrer};
 use mba_io::dataset::Dataset;
 use mba_io::trajectory_file::TimedExposure;
-use mba_tracker::{SimdLevel, TrackerConfig};
+use mba_tracker::TrackerConfig;
 use rayon::prelude::*;
 
 use super::{RunError, RunWriter, deblurred_path};
@@ -42,7 +42,7 @@ pub fn write_deblurred_keyframes(
         return Ok(ControlFlow::Continue(()));
     }
     let is_stopped = AtomicBool::new(false);
-    let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
+    let deblurrer = KeyframeDeblurrer::new(config, dataset.simd());
     let write = |memory: &mut DeblurMemory, (index, exposure): (usize, TimedExposure)| {
         let is_there = deblurred_path(run.folder(), index).is_file();
         let written = if is_there || is_stopped.load(Ordering::Relaxed) {

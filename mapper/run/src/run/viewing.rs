@@ -17,9 +17,10 @@ const TITLE: &str =
 
 /// Colours and sizes for viewers, fitted to the keyframes of a run, and comments that say which way is up and where to start.
 ///
-/// `camera` and `response` are those of the run, `upright` is what it knows of up, and `exposures` and `frames` are its rows.
+/// The map is rendered with the instructions `simd`; `camera` and `response` are those of the run, `upright` is what it knows of up, and `exposures` and `frames` are its rows.
 #[must_use]
 pub fn for_viewers(
+    simd: SimdLevel,
     map: &Gaussians,
     camera: PinholeCamera,
     response: &InverseResponse,
@@ -34,7 +35,7 @@ pub fn for_viewers(
     };
     let keyframes = poses(false);
     let poses = if keyframes.is_empty() { poses(true) } else { keyframes };
-    let ViewerSplats { colours, log_scales } = viewer_splats(map, camera, &poses, response, SimdLevel::new());
+    let ViewerSplats { colours, log_scales } = viewer_splats(map, camera, &poses, response, simd);
     let comments = comments(&up_direction(upright, exposures, frames), start_view(exposures, frames));
     ForViewers { colours, log_scales, comments }
 }

@@ -7,7 +7,7 @@ use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::PinholeCamera;
-use mba_tracker::{FrameResult, SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{FrameResult, Tracker, TrackerConfig};
 
 use super::KnownMap;
 use crate::run::{FrameRecord, FrameStatus, LocalisationFigures, Reason, RunError, RunWriter};
@@ -42,7 +42,7 @@ pub fn localise(
     mut observe: impl FnMut() -> ControlFlow<()>,
 ) -> Result<LocalisationFigures, LocaliseError> {
     let mut memory = vec![0; config.workspace_len()];
-    let tracker = Tracker::new(config, SimdLevel::new(), &mut memory).map_err(LocaliseError::Camera)?;
+    let tracker = Tracker::new(config, dataset.simd(), &mut memory).map_err(LocaliseError::Camera)?;
     let figures = LocalisationFigures { places: map.places(), ..LocalisationFigures::default() };
     let camera = dataset.calibration().camera;
     let mut localiser =

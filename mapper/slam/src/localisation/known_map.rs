@@ -35,9 +35,11 @@ impl<'a> KnownMap<'a> {
     pub fn new(scene: Scene<'a>, run: &Run, dataset: &Dataset, config: &TrackerConfig) -> Self {
         let calibration = dataset.calibration();
         let (camera, response) = (calibration.camera, calibration.response.inverse());
-        let renderer = |camera| ViewRenderer::new(scene, camera, &response, calibration.depth_scale);
+        let simd = dataset.simd();
+        let renderer = |camera| ViewRenderer::new(simd, scene, camera, &response, calibration.depth_scale);
         let places = Places::of(run, camera, calibration.depth_scale, renderer);
-        Self { renderer: renderer(camera), camera, relocaliser: Relocaliser::new(config), places }
+        let relocaliser = Relocaliser::new(config, simd);
+        Self { renderer: renderer(camera), camera, relocaliser, places }
     }
 
     /// Number of views that a place is recognised by.

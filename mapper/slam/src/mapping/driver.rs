@@ -177,6 +177,7 @@ impl Work<'_> {
                 None => Fingerprint::of(&decisive),
                 Some(part) => Fingerprint::of(&(decisive, part)),
             },
+            simd: Fingerprint::of_simd(dataset.simd()),
         }
     }
 }

@@ -8,7 +8,6 @@ use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
 use mba_map::map::Scene;
 use mba_map::rendering::{Behind, ViewRenderer};
-use mba_tracker::SimdLevel;
 use rayon::prelude::*;
 
 use super::prepare::Frames;
@@ -44,7 +43,7 @@ pub(super) fn write(
     }
     write_map(writer, dataset, bundle)?;
     let config = tracker_config(dataset, &TrackingOptions::default());
-    let deblurrer = KeyframeDeblurrer::new(&config, SimdLevel::new());
+    let deblurrer = KeyframeDeblurrer::new(&config, dataset.simd());
     let count = bundle.keyframes().len();
     for first in (0..count).step_by(TOGETHER) {
         let keyframes = first..count.min(first + TOGETHER);
@@ -75,6 +74,7 @@ fn write_map(writer: &RunWriter, dataset: &Dataset, bundle: &BundleAdjustment) -
     let calibration = dataset.calibration();
     let response = calibration.response.inverse();
     let viewing = for_viewers(
+        dataset.simd(),
         map,
         calibration.camera,
         &response,
@@ -112,7 +112,8 @@ impl<'a> Pictures<'a> {
     fn renderer(&self) -> ViewRenderer<'a> {
         let calibration = self.dataset.calibration();
         let response = calibration.response.inverse();
-        ViewRenderer::new(&self.bundle.state.map, calibration.camera, &response, calibration.depth_scale)
+        let (simd, map) = (self.dataset.simd(), &self.bundle.state.map);
+        ViewRenderer::new(simd, map, calibration.camera, &response, calibration.depth_scale)
             .through(self.bundle.sensor().falloff.clone())
     }
 

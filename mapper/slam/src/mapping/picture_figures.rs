@@ -129,8 +129,8 @@ fn held_out_scores(dataset: &Dataset, map: Scene<'_>, exposures: &[TimedExposure
     let map_from_truth = alignment.reference_from_estimate.inverse();
     let calibration = dataset.calibration();
     let (camera, response) = (calibration.camera, calibration.response.inverse());
-    let mut renderer =
-        ViewRenderer::new(map, camera, &response, calibration.depth_scale).through(sensor(dataset).falloff);
+    let mut renderer = ViewRenderer::new(dataset.simd(), map, camera, &response, calibration.depth_scale)
+        .through(sensor(dataset).falloff);
     for (index, pose) in poses.iter().enumerate() {
         let Some(truth) = read(&folder.join(format!("{index:06}.png"))) else { continue };
         let view = renderer.render(&map_from_truth.compose(&pose.world_from_camera), Behind::Surroundings);

@@ -9,7 +9,6 @@ use mba_io::statistics::quantile;
 use mba_io::trajectory_file::TimedExposure;
 use mba_raster::exposure::{ExposurePath, motion_of};
 use mba_raster::sensor::Sensor;
-use mba_tracker::SimdLevel;
 use nalgebra::Vector6;
 use rayon::prelude::*;
 
@@ -193,7 +192,7 @@ pub(super) fn bundle(
         keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
     set_gains(&sensor, &keyframes, &mut states);
     let picture = sensor.camera.width * sensor.camera.height;
-    let mut bundle = BundleAdjustment::new(SimdLevel::new(), sensor, settings.bundle(), keyframes, states);
+    let mut bundle = BundleAdjustment::new(dataset.simd(), sensor, settings.bundle(), keyframes, states);
     if settings.max_gaussians.is_none() {
         bundle.set_max_gaussians(bundle.seen_surface().gaussians(picture));
     }

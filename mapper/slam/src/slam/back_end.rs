@@ -62,8 +62,8 @@ impl BackEnd {
         (writer, keeper): (RunWriter, Option<Keeper>),
     ) -> Self {
         Self {
-            map: GrowingMap::new(sensor(dataset), settings),
-            loops: Loops::new(config),
+            map: GrowingMap::new(dataset.simd(), sensor(dataset), settings),
+            loops: Loops::new(config, dataset.simd()),
             settings: *settings,
             writer,
             moves: Vec::new(),
@@ -85,9 +85,9 @@ impl BackEnd {
     ) -> Result<Option<Replay>, SlamError> {
         let images = keyframe_images(dataset, &parts.keyframes)?;
         let keyframes = keyframes(&self.map.sensor, &parts.keyframes, &images)?;
-        let sensor = self.map.sensor.clone();
+        let (simd, sensor) = (dataset.simd(), self.map.sensor.clone());
         let grown = (parts.max_gaussians, parts.growth);
-        self.map = GrowingMap::restored(sensor, &self.settings, (keyframes, state), grown);
+        self.map = GrowingMap::restored((simd, sensor), &self.settings, (keyframes, state), grown);
         self.loops.restore(&parts.loops, &images, &self.map.sensor.camera);
         self.moves = parts.moves.into_iter().map(pose).collect();
         let Counts { frames_on_map, late_frames, relocalisations } = parts.counts;

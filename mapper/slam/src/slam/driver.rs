@@ -9,7 +9,7 @@ use mba_io::checkpoint::load;
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;
 use mba_map::map::MapKind;
-use mba_tracker::{SimdLevel, TrackerConfig};
+use mba_tracker::TrackerConfig;
 
 use super::back_end::{BackEnd, keyframe_images, keyframes};
 use super::messages::link;
@@ -165,7 +165,7 @@ impl SlamRun<'_> {
         let keyframes = keyframes(&sensor, &parts.keyframes, &images)?;
         let settings = self.settings.mapping().bundle();
         let frames = state.frames.clone();
-        let mut bundle = BundleAdjustment::new(SimdLevel::new(), sensor, settings, keyframes, frames);
+        let mut bundle = BundleAdjustment::new(self.dataset.simd(), sensor, settings, keyframes, frames);
         bundle.set_max_gaussians(parts.max_gaussians);
         writer.restore(parts.rows)?;
         let Counts { frames_on_map, late_frames, relocalisations } = parts.counts;

@@ -6,7 +6,7 @@ use mba_io::checkpoint::CheckpointError;
 use mba_io::dataset::Dataset;
 use mba_tracker::error::FrameError as TrackError;
 use mba_tracker::geometry::RigidTransform;
-use mba_tracker::{SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{Tracker, TrackerConfig};
 
 use super::arrival_clock::Pace;
 use super::messages::{AHEAD, Instruction, SharpView, Skipped, TrackedFrame, TrackerLink};
@@ -35,7 +35,7 @@ pub(super) fn run(
     mut replay: Option<Replay>,
 ) -> Result<(), TrackingError> {
     let mut memory = vec![0; config.workspace_len()];
-    let mut tracker = Tracker::new(config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
+    let mut tracker = Tracker::new(config, dataset.simd(), &mut memory).map_err(TrackingError::Camera)?;
     let (mut state, mut first) = (ThreadState::default(), 0);
     if let Some(replay) = &mut replay {
         first = replay.frames;

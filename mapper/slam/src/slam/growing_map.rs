@@ -50,6 +50,7 @@ const DENSITY_EVERY: usize = 48;
 pub(super) struct GrowingMap {
     pub(super) bundle: BundleAdjustment,
     pub(super) sensor: Sensor,
+    pub(super) simd: SimdLevel,
     settings: SlamSettings,
     random: Pcg32,
     /// Effort that is left over, or was taken in advance.
@@ -62,22 +63,31 @@ pub(super) struct GrowingMap {
 }
 
 impl GrowingMap {
-    pub(super) fn new(sensor: Sensor, settings: &SlamSettings) -> Self {
+    pub(super) fn new(simd: SimdLevel, sensor: Sensor, settings: &SlamSettings) -> Self {
         let bundle_settings = settings.mapping().bundle();
-        let level = SimdLevel::new();
-        let bundle = BundleAdjustment::new(level, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
+        let bundle = BundleAdjustment::new(simd, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
         let random = Pcg32::new(settings.seed, 0);
-        Self { bundle, sensor, settings: *settings, random, effort: 0.0, steps: 0, seen: 0.0, retired: 0 }
+        Self {
+            bundle,
+            sensor,
+            simd,
+            settings: *settings,
+            random,
+            effort: 0.0,
+            steps: 0,
+            seen: 0.0,
+            retired: 0,
+        }
     }
 
     /// The map of a run that was stopped, with its keyframes.
     pub(super) fn restored(
-        sensor: Sensor,
+        (simd, sensor): (SimdLevel, Sensor),
         settings: &SlamSettings,
         (keyframes, state): (Vec<MapKeyframe>, BundleState),
         (max_gaussians, growth): (usize, Growth),
     ) -> Self {
-        let mut map = Self::new(sensor, settings);
+        let mut map = Self::new(simd, sensor, settings);
         for (keyframe, frame) in keyframes.into_iter().zip(&state.frames) {
             map.bundle.push(keyframe, frame.clone());
         }

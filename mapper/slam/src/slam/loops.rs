@@ -4,8 +4,8 @@ use mba_adjust::places::{PlaceDescriptor, PlaceIndex};
 use mba_adjust::pose_graph::{PoseGraph, PoseGraphEdge, PoseGraphSettings};
 use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::dataset::RgbdFrame;
-use mba_tracker::TrackerConfig;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
+use mba_tracker::{SimdLevel, TrackerConfig};
 
 use super::growing_map::GrowingMap;
 use super::keyframe_choice::view_change;
@@ -53,9 +53,9 @@ struct Closure {
 }
 
 impl Loops {
-    pub(super) fn new(config: &TrackerConfig) -> Self {
+    pub(super) fn new(config: &TrackerConfig, simd: SimdLevel) -> Self {
         Self {
-            relocaliser: Relocaliser::new(config),
+            relocaliser: Relocaliser::new(config, simd),
             places: PlaceIndex::default(),
             closed: Vec::new(),
             pause: 0,

@@ -16,6 +16,7 @@ const MIN_INLIERS: f32 = 0.35;
 /// A tracker of its own, which starts anew for every question.
 pub(crate) struct Relocaliser {
     config: TrackerConfig,
+    simd: SimdLevel,
     memory: Vec<u8>,
     deblurrer: KeyframeDeblurrer,
     deblur_memory: DeblurMemory,
@@ -33,13 +34,13 @@ pub(crate) struct PoseMeasurement {
 }
 
 impl Relocaliser {
-    pub(crate) fn new(config: &TrackerConfig) -> Self {
-        let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
+    pub(crate) fn new(config: &TrackerConfig, simd: SimdLevel) -> Self {
+        let deblurrer = KeyframeDeblurrer::new(config, simd);
         let deblur_memory = deblurrer.memory();
         let mut config = config.clone();
         // The whole of what is known: a place is recognised from a single view.
         config.align.depth_term = true;
-        Self { memory: vec![0; config.workspace_len()], config, deblurrer, deblur_memory }
+        Self { memory: vec![0; config.workspace_len()], config, simd, deblurrer, deblur_memory }
     }
 
     /// Aligns a frame with a view, from a guess of the frame's pose; `None` if they do not fit.
@@ -49,7 +50,7 @@ impl Relocaliser {
         view: &SharpView,
         world_from_camera: &RigidTransform,
     ) -> Option<PoseMeasurement> {
-        let mut tracker = Tracker::new(&self.config, SimdLevel::new(), &mut self.memory).ok()?;
+        let mut tracker = Tracker::new(&self.config, self.simd, &mut self.memory).ok()?;
         let align = || -> Result<_, TrackError> {
             tracker.relocate(&view.reference(&self.config.camera)?, world_from_camera)?;
             tracker.track(&tracker_view(image)?)

@@ -269,6 +269,7 @@ pub(super) fn identity(dataset: &Dataset, settings: &SlamSettings) -> Identity {
         dataset: dataset_fingerprint(dataset),
         trajectory: Fingerprint::default(),
         settings: Fingerprint::of(&format!("{decisive:?}")),
+        simd: Fingerprint::of_simd(dataset.simd()),
     }
 }
 

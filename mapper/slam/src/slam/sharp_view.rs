@@ -14,6 +14,7 @@ impl GrowingMap {
     pub(super) fn sharp_view(&self, world_from_camera: &RigidTransform) -> Option<SharpView> {
         let sensor = &self.sensor;
         let mut renderer = ViewRenderer::new(
+            self.simd,
             &self.bundle.state.map,
             sensor.camera,
             &sensor.inverse_response,

@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use mba_io::dataset::Dataset;
 use mba_io::trajectory_file::TimedExposure;
 use mba_tracker::error::FrameError;
-use mba_tracker::{ExpectedPath, Frame, FrameStatus, GyroReading, SimdLevel, Tracker, TrackerConfig};
+use mba_tracker::{ExpectedPath, Frame, FrameStatus, GyroReading, Tracker, TrackerConfig};
 
 use crate::tracking::{
     Measured, TrackingError, TrackingOptions, add_gyroscope, timed_result, tracker_config, tracker_view,
@@ -35,7 +35,7 @@ pub(super) fn track_backwards(
 ) -> Result<Vec<Option<SeenBackwards>>, TrackingError> {
     let config = backwards(&tracker_config(dataset, options));
     let mut memory = vec![0; config.workspace_len()];
-    let mut tracker = Tracker::new(&config, SimdLevel::new(), &mut memory).map_err(TrackingError::Camera)?;
+    let mut tracker = Tracker::new(&config, dataset.simd(), &mut memory).map_err(TrackingError::Camera)?;
     let mut uncertainty = Uncertainty::default();
     let mut given: Vec<usize> = Vec::new();
     let mut seen = vec![None; dataset.len()];

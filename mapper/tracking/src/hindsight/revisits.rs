@@ -37,7 +37,7 @@ pub(super) fn revisits(
     keyframes: &[usize],
     exposures: &[TimedExposure],
 ) -> Vec<PoseGraphEdge> {
-    let mut aligner = Aligner::new(config);
+    let mut aligner = Aligner::new(config, dataset.simd());
     let mut places = PlaceIndex::default();
     let (mut edges, mut pause) = (Vec::new(), 0_usize);
     for (k, &now) in keyframes.iter().enumerate() {
@@ -68,16 +68,17 @@ pub(super) fn revisits(
 /// A tracker that starts anew for every pair of frames.
 struct Aligner<'a> {
     config: &'a TrackerConfig,
+    simd: SimdLevel,
     memory: Vec<u8>,
     deblurrer: KeyframeDeblurrer,
     deblur_memory: DeblurMemory,
 }
 
 impl<'a> Aligner<'a> {
-    fn new(config: &'a TrackerConfig) -> Self {
-        let deblurrer = KeyframeDeblurrer::new(config, SimdLevel::new());
+    fn new(config: &'a TrackerConfig, simd: SimdLevel) -> Self {
+        let deblurrer = KeyframeDeblurrer::new(config, simd);
         let deblur_memory = deblurrer.memory();
-        Self { memory: vec![0; config.workspace_len()], config, deblurrer, deblur_memory }
+        Self { memory: vec![0; config.workspace_len()], config, simd, deblurrer, deblur_memory }
     }
 
     /// The motion from a place, a frame with its exposure, to another frame; `None` if they do not fit from any of the guesses
@@ -92,7 +93,7 @@ impl<'a> Aligner<'a> {
         let rgb = deblurred.map_or_else(|_| place.rgb.clone(), |deblurred| deblurred.rgb);
         let (width, height) = (place.width, place.height);
         guesses.iter().find_map(|guess| {
-            let mut tracker = Tracker::new(self.config, SimdLevel::new(), &mut self.memory).ok()?;
+            let mut tracker = Tracker::new(self.config, self.simd, &mut self.memory).ok()?;
             let align = || -> Result<_, FrameError> {
                 let view = ReferenceView {
                     colour: ColourView::new(&rgb, width, height, 3 * width, PixelFormat::Rgb8)?,

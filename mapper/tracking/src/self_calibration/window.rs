@@ -69,14 +69,15 @@ pub(super) struct Tracked {
     pub(super) residual: f64,
 }
 
-/// Tracks whatever `frames` gives with `config`; frames that cannot be used are left out.
+/// Tracks whatever `frames` gives with `config` and the instructions `simd`; frames that cannot be used are left out.
 fn track<T: Borrow<RgbdFrame>>(
+    simd: SimdLevel,
     frames: impl Iterator<Item = T>,
     config: &TrackerConfig,
     guess: &Guess,
 ) -> Vec<Tracked> {
     let mut memory = vec![0; config.workspace_len()];
-    let Ok(mut tracker) = Tracker::new(config, SimdLevel::new(), &mut memory) else { return Vec::new() };
+    let Ok(mut tracker) = Tracker::new(config, simd, &mut memory) else { return Vec::new() };
     let mut found: Vec<Tracked> = Vec::new();
     for image in frames {
         let image = image.borrow();
@@ -143,14 +144,15 @@ impl<'a> Recording<'a> {
 
     /// Tracks `frames`, whose resolution was halved `level` times, with a supposed camera.
     pub(super) fn track(&self, frames: &[RgbdFrame], level: usize, guess: &Guess) -> Vec<Tracked> {
-        track(frames.iter(), &self.config(level, guess), guess)
+        track(self.dataset.simd(), frames.iter(), &self.config(level, guess), guess)
     }
 
     /// Tracks the whole data set at coarse resolution; only a few frames are in memory at a time.
     pub(super) fn track_everything(&self, guess: &Guess) -> Vec<Tracked> {
         let (frames, level) = (self.dataset.len(), self.level(Resolution::Coarse));
         let chunk = |start: usize| self.read(start..frames.min(start + CHUNK), level);
-        track((0..frames).step_by(CHUNK).flat_map(chunk), &self.config(level, guess), guess)
+        let images = (0..frames).step_by(CHUNK).flat_map(chunk);
+        track(self.dataset.simd(), images, &self.config(level, guess), guess)
     }
 
     /// The stretch of the recording that turns most, tracked at coarse resolution.

@@ -132,5 +132,6 @@ fn identity(dataset: &Dataset, options: &TrackingOptions) -> Identity {
         dataset: Fingerprint::of_dataset(dataset),
         trajectory: Fingerprint::default(),
         settings: Fingerprint::of(&format!("{options:?}")),
+        simd: Fingerprint::of_simd(dataset.simd()),
     }
 }

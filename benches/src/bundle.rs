@@ -1,7 +1,7 @@
 //! A bundle that is being adjusted: blurred frames of the synthetic room and a map seeded from them.
 
 use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, FrameState, MapKeyframe, MapModel, PathPrior, StepReport,
+    BundleAdjustment, BundleSettings, FrameState, MapKeyframe, MapModel, MappedFrame, PathPrior, StepReport,
 };
 use mba_mapper::exposure::{ExposurePath, RowTiming};
 use mba_mapper::map::MapKind;
@@ -52,14 +52,11 @@ impl BundleInput {
         let sensor = sensor(&sequence);
         let blurred = |index: &usize| sequence.blur(*index).mean_px > KEYFRAME_BLUR_PX;
         let frames: Vec<_> = (0..FRAMES).filter(blurred).map(|index| sequence.render_frame(index)).collect();
-        let states =
-            frames.iter().map(|frame| FrameState::new(ExposurePath::linear(frame.exposure))).collect();
-        let keyframes =
-            (0..).zip(frames).filter_map(|(index, frame)| keyframe(&sensor, index, frame)).collect();
+        let frames = (0..).zip(frames).filter_map(|(index, frame)| mapped(&sensor, index, frame)).collect();
         let kind = MapKind::Gaussians;
         let max_gaussians = width * height / 3;
         let settings = BundleSettings { kind, blur: true, max_views: VIEWS, max_gaussians, seed: 1 };
-        let mut bundle = BundleAdjustment::new(level, sensor, settings, keyframes, states);
+        let mut bundle = BundleAdjustment::new(level, sensor, settings, frames);
         bundle.seed();
         for k in 1..=GROWING {
             bundle.step(false, |_| POSITION * k as f64 / GROWING as f64);
@@ -70,13 +67,13 @@ impl BundleInput {
     /// Keyframes that are visited in turn.
     #[must_use]
     pub fn keyframes(&self) -> usize {
-        self.bundle.keyframes().len()
+        self.bundle.frames.len()
     }
 
     /// Gaussians in the map.
     #[must_use]
     pub fn gaussians(&self) -> usize {
-        self.bundle.state.map.size().gaussians()
+        self.bundle.map.size().gaussians()
     }
 
     /// One step on the next keyframe; the schedule does not move.
@@ -98,8 +95,9 @@ pub(crate) fn sensor(sequence: &SynthSequence) -> Sensor {
     }
 }
 
-fn keyframe(sensor: &Sensor, index: usize, frame: SynthFrame) -> Option<MapKeyframe> {
+fn mapped(sensor: &Sensor, index: usize, frame: SynthFrame) -> Option<MappedFrame> {
+    let state = FrameState::new(ExposurePath::linear(frame.exposure));
     let prior = PathPrior { middle: frame.world_from_camera, is_measured: true, motion: None };
     let observation = ObservationPyramid::new(sensor, &frame.into_captured(index), 2)?;
-    Some(MapKeyframe::new(index, observation, prior))
+    Some(MappedFrame { keyframe: MapKeyframe::new(index, observation, prior), state })
 }

@@ -2,8 +2,8 @@
 //! rendered and fitted.
 
 use mba_mapper::bundle::{
-    BundleAdjustment, BundleSettings, DepthSource, FrameState, MapKeyframe, MapModel, PathPrior, Schedule,
-    SeedView, StepPlan,
+    BundleAdjustment, BundleSettings, DepthSource, FrameState, MapKeyframe, MapModel, MappedFrame, PathPrior,
+    Schedule, SeedView, StepPlan,
 };
 use mba_mapper::dataset::RgbdFrame;
 use mba_mapper::exposure::{ExposurePath, RowTiming};
@@ -125,7 +125,8 @@ fn a_box_of_one_colour_is_fitted_rendered_and_meshed() {
         falloff: None,
     };
     let still = || FrameState::new(ExposurePath::still(RigidTransform::identity()));
-    let frames = [(0, 100), (1, 120)].map(|(index, byte)| (keyframe(&sensor, index, byte), still()));
+    let frames = [(0, 100), (1, 120)]
+        .map(|(index, byte)| MappedFrame { keyframe: keyframe(&sensor, index, byte), state: still() });
     let settings =
         BundleSettings { kind: MapKind::default(), blur: false, max_views: 1, max_gaussians: 0, seed: 1 };
     let map = ColourBox { light: 0.9, is_seeded: false };
@@ -138,13 +139,13 @@ fn a_box_of_one_colour_is_fitted_rendered_and_meshed() {
         frames.into(),
     );
     bundle.seed_from(0, DepthSource::Measured);
-    assert!(!bundle.state.map.is_empty());
+    assert!(!bundle.map.is_empty());
     assert_eq!(bundle.uncovered_fraction(&RigidTransform::identity(), 0), 0.0);
     for k in 1..=60 {
         bundle.step(false, |_| f64::from(k) / 60.0).expect("there are keyframes");
     }
     // The mean of what both frames show, (100 + 120)/2.
-    let map = &bundle.state.map;
+    let map = &bundle.map;
     assert!((map.light - 110.0 / 255.0).abs() < 0.02, "{}", map.light);
 
     let mut renderer = SceneRenderer::new(Level::new());

@@ -3,18 +3,19 @@
 use mba_io::statistics::quantile;
 use mba_map::map::{MapKind, Scene, SceneRenderer};
 use mba_raster::losses::{Exposure, LossTerms};
-use mba_raster::sensor::{Observation, ObservationPyramid, Sensor};
+use mba_raster::sensor::{Observation, Sensor};
 use mba_tracker::geometry::RigidTransform;
 use mba_tracker::simd::Level;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
 
+use super::bundle_state::{BorrowedBundleState, BundleProgress, BundleState};
 use super::capacity::SeenSurface;
 use super::frame_state::FrameState;
 use super::map_model::{FitContext, MapModel};
-use super::path_metric::PathMetric;
-use super::path_step::{PathPrior, PathStep};
+use super::mapped_frame::{MapKeyframe, MappedFrame};
+use super::path_step::PathStep;
 use super::rectified::seen_at_once;
 use super::scene_map::SceneMap;
 use super::schedule::{Schedule, StepPlan};
@@ -37,52 +38,14 @@ pub struct BundleSettings {
     pub seed: u64,
 }
 
-/// A frame that the map is fitted to.
-#[derive(Clone, Debug)]
-pub struct MapKeyframe {
-    /// Index in the data set.
-    pub index: usize,
-    /// What was captured.
-    pub observation: ObservationPyramid,
-    /// What is known of its path besides.
-    pub prior: PathPrior,
-    /// Typical depth, metres.
-    pub depth: f64,
-    /// Coordinates of its path.
-    pub metric: PathMetric,
-}
-
-impl MapKeyframe {
-    /// Frame `index` of the data set.
-    #[must_use]
-    pub fn new(index: usize, observation: ObservationPyramid, prior: PathPrior) -> Self {
-        let depth = typical_depth(observation.level(0));
-        let metric = PathMetric::new(observation.level(1), depth);
-        Self { index, observation, prior, depth, metric }
-    }
-}
-
-/// All that changes from step to step: enough to go on after an interruption.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BundleState<M = SceneMap> {
-    /// The map.
-    pub map: M,
-    /// One per keyframe.
-    pub frames: Vec<FrameState>,
-    /// Steps made.
-    pub steps: usize,
-    /// Those of the schedule.
-    pub scheduled_steps: usize,
-    /// Where the schedule stands, 0 to 1.
-    pub position: f64,
-}
-
 /// A map, keyframes, and what is needed to fit the one to the other.
 #[derive(Debug)]
 pub struct BundleAdjustment<M: MapModel = SceneMap> {
-    /// What was estimated so far.
-    pub state: BundleState<M>,
-    pub(super) keyframes: Vec<MapKeyframe>,
+    /// The map.
+    pub map: M,
+    /// The keyframes in the order of time, with what was estimated of them so far.
+    pub frames: Vec<MappedFrame>,
+    progress: BundleProgress,
     settings: BundleSettings,
     schedule: Schedule,
     sensor: Sensor,
@@ -111,20 +74,11 @@ const FITS_FROM: u64 = 1 << 40;
 
 impl BundleAdjustment {
     /// Keyframes of one sensor with first estimates of their states, and an empty map; [`Self::seed`] fills it.
-    ///
-    /// Keyframes without a state are left out.
     #[must_use]
-    pub fn new(
-        level: Level,
-        sensor: Sensor,
-        settings: BundleSettings,
-        keyframes: Vec<MapKeyframe>,
-        frames: Vec<FrameState>,
-    ) -> Self {
+    pub fn new(level: Level, sensor: Sensor, settings: BundleSettings, frames: Vec<MappedFrame>) -> Self {
         let map = SceneMap::new(settings.kind, settings.seed);
         let context = FitContext::new(level, sensor.clone());
-        let schedule = Schedule::of(settings.kind, keyframes.len());
-        let frames = keyframes.into_iter().zip(frames).collect();
+        let schedule = Schedule::of(settings.kind, frames.len());
         Self::with_map((map, context), schedule, level, sensor, settings, frames)
     }
 }
@@ -139,18 +93,33 @@ impl<M: MapModel> BundleAdjustment<M> {
         level: Level,
         sensor: Sensor,
         settings: BundleSettings,
-        frames: Vec<(MapKeyframe, FrameState)>,
+        frames: Vec<MappedFrame>,
     ) -> Self {
-        let (keyframes, frames) = frames.into_iter().unzip();
-        let state = BundleState { map, frames, steps: 0, scheduled_steps: 0, position: 0.0 };
+        let progress = BundleProgress::default();
         let (renderer, round) = (SceneRenderer::new(level), (usize::MAX, Vec::new()));
-        Self { state, keyframes, settings, schedule, sensor, renderer, context, round }
+        Self { map, frames, progress, settings, schedule, sensor, renderer, context, round }
     }
 
-    /// The keyframes.
+    /// How far it is.
     #[must_use]
-    pub fn keyframes(&self) -> &[MapKeyframe] {
-        &self.keyframes
+    pub fn progress(&self) -> BundleProgress {
+        self.progress
+    }
+
+    /// All that changes from step to step, for a checkpoint.
+    #[must_use]
+    pub fn state(&self) -> BorrowedBundleState<'_, M> {
+        let frames = self.frames.iter().map(|frame| &frame.state).collect();
+        BorrowedBundleState { map: &self.map, frames, progress: self.progress }
+    }
+
+    /// Goes on from where an adjustment of the same keyframes was stopped. Keyframes of which nothing was kept stay as they
+    /// are.
+    pub fn restore(&mut self, state: BundleState<M>) {
+        (self.map, self.progress) = (state.map, state.progress);
+        for (frame, kept) in self.frames.iter_mut().zip(state.frames) {
+            frame.state = kept;
+        }
     }
 
     /// The sensor.
@@ -165,29 +134,10 @@ impl<M: MapModel> BundleAdjustment<M> {
         &self.schedule
     }
 
-    /// Adds a keyframe with a first estimate of its state, the last in order.
-    pub fn push(&mut self, keyframe: MapKeyframe, frame: FrameState) {
-        self.keyframes.push(keyframe);
-        self.state.frames.push(frame);
-    }
-
-    /// Takes keyframe `k` out; what the map learnt from it stays. Returns `None` if there is no such keyframe.
-    pub fn remove_keyframe(&mut self, k: usize) -> Option<(MapKeyframe, FrameState)> {
-        let both = k < self.keyframes.len().min(self.state.frames.len());
-        both.then(|| (self.keyframes.remove(k), self.state.frames.remove(k)))
-    }
-
-    /// What is known of the path of keyframe `k` besides its picture.
-    pub fn set_prior(&mut self, k: usize, prior: PathPrior) {
-        if let Some(keyframe) = self.keyframes.get_mut(k) {
-            keyframe.prior = prior;
-        }
-    }
-
     /// Starts another schedule at its beginning.
     pub fn set_schedule(&mut self, schedule: Schedule) {
         self.schedule = schedule;
-        (self.state.scheduled_steps, self.state.position) = (0, 0.0);
+        (self.progress.scheduled_steps, self.progress.position) = (0, 0.0);
     }
 
     /// Allows up to so many Gaussians from now on.
@@ -204,13 +154,13 @@ impl<M: MapModel> BundleAdjustment<M> {
     /// What the keyframes see together.
     #[must_use]
     pub fn seen_surface(&self) -> SeenSurface {
-        let depths: Vec<f64> = self.keyframes.iter().map(|keyframe| keyframe.depth).collect();
+        let depths: Vec<f64> = self.frames.iter().map(|frame| frame.keyframe.depth).collect();
         let mut surface = SeenSurface::new(quantile(&depths, 0.5).unwrap_or(1.0));
-        for (keyframe, frame) in self.keyframes.iter().zip(&self.state.frames) {
+        for MappedFrame { keyframe, state } in &self.frames {
             // Half of the pixels along each axis are enough to count by.
             let coarse = keyframe.observation.level(1);
             let shrink = keyframe.observation.level(0).camera.width / coarse.camera.width.max(1);
-            surface.add(coarse, &frame.path.mid(), shrink);
+            surface.add(coarse, &state.path.mid(), shrink);
         }
         surface
     }
@@ -218,30 +168,31 @@ impl<M: MapModel> BundleAdjustment<M> {
     /// Fills the map with what the keyframes see, the sharpest first: each adds what those before it do not cover. Then,
     /// once more, surfaces that no keyframe has a depth of.
     pub fn seed(&mut self) {
-        let mut order: Vec<usize> = (0..self.keyframes.len()).collect();
+        let mut order: Vec<usize> = (0..self.frames.len()).collect();
         order.sort_by(|a, b| self.blur_px(*a).total_cmp(&self.blur_px(*b)));
         for source in [DepthSource::Measured, DepthSource::Completed] {
             for &k in &order {
                 self.seed_from(k, source);
             }
         }
-        self.state.map.reorder();
+        self.map.reorder();
     }
 
     /// Adds what keyframe `k` sees and the map does not cover.
     pub fn seed_from(&mut self, k: usize, source: DepthSource) {
-        let FrameState { path, log_gain, .. } = &self.state.frames[k];
+        let MappedFrame { keyframe, state } = &self.frames[k];
+        let FrameState { path, log_gain, .. } = state;
         let (world_from_camera, gain) = (path.mid(), log_gain.exp() as f32);
-        let MapKeyframe { index, observation, .. } = &self.keyframes[k];
+        let MapKeyframe { index, observation, .. } = keyframe;
         let seen = seen_at_once(observation.level(0), path);
         let view = SeedView { index: *index, seen: &seen, world_from_camera, gain, source };
-        self.state.map.seed(&mut self.context, &view, self.settings.max_gaussians);
+        self.map.seed(&mut self.context, &view, self.settings.max_gaussians);
     }
 
     /// Share (0 to 1) of the picture from a pose that the map does not show, at resolution `level`, where 0 is full.
     pub fn uncovered_fraction(&mut self, world_from_camera: &RigidTransform, level: usize) -> f64 {
         let Self { renderer, sensor, .. } = self;
-        renderer.render(self.state.map.scene(), sensor.camera.at_level(level), world_from_camera);
+        renderer.render(self.map.scene(), sensor.camera.at_level(level), world_from_camera);
         let alpha = &renderer.image.alpha;
         let open = alpha.iter().filter(|alpha| **alpha < seeding::COVERED).count();
         open as f64 / alpha.len().max(1) as f64
@@ -250,7 +201,7 @@ impl<M: MapModel> BundleAdjustment<M> {
     /// Number of virtual views of a pixel that a step with `plan` on keyframe `k` renders.
     #[must_use]
     pub fn views(&self, k: usize, plan: &StepPlan) -> usize {
-        self.settings.view_count(&self.keyframes[k], &self.state.frames[k], plan).per_pixel
+        self.settings.view_count(&self.frames[k].keyframe, &self.frames[k].state, plan).per_pixel
     }
 
     /// One step on the next keyframe, after which the schedule stands at `position_after`. `timed` says whether
@@ -259,11 +210,11 @@ impl<M: MapModel> BundleAdjustment<M> {
     /// Returns `None` without keyframes.
     pub fn step(&mut self, timed: bool, position_after: impl FnOnce(&Schedule) -> f64) -> Option<StepReport> {
         let k = self.next_keyframe()?;
-        let plan = self.schedule.plan(self.state.position, timed);
+        let plan = self.schedule.plan(self.progress.position, timed);
         let report = self.visit(k, &plan);
-        self.state.scheduled_steps += 1;
-        let before = core::mem::replace(&mut self.state.position, position_after(&self.schedule));
-        if self.schedule.density_changes(before, self.state.position) {
+        self.progress.scheduled_steps += 1;
+        let before = core::mem::replace(&mut self.progress.position, position_after(&self.schedule));
+        if self.schedule.density_changes(before, self.progress.position) {
             self.change_density();
         }
         Some(report)
@@ -271,17 +222,15 @@ impl<M: MapModel> BundleAdjustment<M> {
 
     /// One step on keyframe `k`, which must be one.
     pub fn visit(&mut self, k: usize, plan: &StepPlan) -> StepReport {
-        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let MappedFrame { keyframe, state: frame } = &mut self.frames[k];
         let seen = keyframe.observation.level(plan.level);
         let count = self.settings.view_count(keyframe, frame, plan);
         let views = count.of_row;
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-        let draw = self.state.steps as u64;
-        let loss = self.state.map.evaluate(&mut self.context, exposure, plan, draw);
+        let draw = self.progress.steps as u64;
+        let loss = self.map.evaluate(&mut self.context, exposure, plan, draw);
 
-        let BundleState { map, frames, steps, .. } = &mut self.state;
-        map.step(&mut self.context, plan);
-        let frame = &mut frames[k];
+        self.map.step(&mut self.context, plan);
         // The first keyframe says where the world is and how bright.
         let is_first = k == 0;
         if plan.path_pixels > 0.0 {
@@ -301,7 +250,7 @@ impl<M: MapModel> BundleAdjustment<M> {
             }
         }
         frame.visits += 1;
-        *steps += 1;
+        self.progress.steps += 1;
         StepReport { keyframe: k, views: count.per_pixel, terms: loss.terms }
     }
 
@@ -318,7 +267,7 @@ impl<M: MapModel> BundleAdjustment<M> {
             let shrink = 0.05_f64.powf(k as f64 / count as f64);
             let views = self.settings.view_count(unmapped, frame, &plan).of_row;
             let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
-            let loss = self.state.map.evaluate(&mut self.context, exposure, &plan, draw);
+            let loss = self.map.evaluate(&mut self.context, exposure, &plan, draw);
             if loss.terms.total() < least {
                 (best, least) = (frame.clone(), loss.terms.total());
             }
@@ -344,13 +293,13 @@ impl<M: MapModel> BundleAdjustment<M> {
         let seen = unmapped.observation.level(plan.level);
         let exposure = Exposure { seen, path: &frame.path, gain: frame.log_gain.exp(), views };
         let draw = FITS_FROM + unmapped.index as u64;
-        self.state.map.evaluate(&mut self.context, exposure, &plan, draw).terms.mean_square
+        self.map.evaluate(&mut self.context, exposure, &plan, draw).terms.mean_square
     }
 
     /// The next keyframe of a random order in which every keyframe comes once per round.
     fn next_keyframe(&mut self) -> Option<usize> {
-        let count = self.keyframes.len().min(self.state.frames.len());
-        let (round, place) = (self.state.steps.checked_div(count)?, self.state.steps % count);
+        let (count, steps) = (self.frames.len(), self.progress.steps);
+        let (round, place) = (steps.checked_div(count)?, steps % count);
         if self.round.0 != round {
             self.round = (round, shuffled(count, self.settings.seed, round));
         }
@@ -359,15 +308,15 @@ impl<M: MapModel> BundleAdjustment<M> {
 
     /// Puts detail where it is missing and removes what is useless.
     pub fn change_density(&mut self) {
-        self.state.map.change_density(self.settings.max_gaussians);
+        self.map.change_density(self.settings.max_gaussians);
     }
 
     /// Length of the blur of keyframe `k`, full-resolution pixels.
     #[must_use]
     pub fn blur_px(&self, k: usize) -> f64 {
-        let keyframe = &self.keyframes[k];
+        let MappedFrame { keyframe, state } = &self.frames[k];
         let exposure = keyframe.observation.level(0).times.exposure;
-        self.state.frames[k].blur_px(&self.sensor.camera, keyframe.depth, exposure)
+        state.blur_px(&self.sensor.camera, keyframe.depth, exposure)
     }
 }
 
@@ -376,8 +325,8 @@ impl BundleAdjustment {
     /// a field, whose virtual views take half a second each.
     #[must_use]
     pub fn explained(&mut self, k: usize) -> Option<Reblurred> {
-        let Scene::Gaussians(gaussians) = self.state.map.scene() else { return None };
-        let (keyframe, frame) = (&self.keyframes[k], &self.state.frames[k]);
+        let Scene::Gaussians(gaussians) = self.map.scene() else { return None };
+        let MappedFrame { keyframe, state: frame } = &self.frames[k];
         let seen = keyframe.observation.level(0);
         let plan = StepPlan { level: 0, ..self.schedule.plan(1.0, false) };
         let views = self.settings.view_count(keyframe, frame, &plan).of_row;
@@ -429,16 +378,6 @@ impl BundleSettings {
         let wanted = ((blur_px / plan.spacing).ceil() as usize).max(least) | 1;
         wanted.min(most.saturating_sub(1) | 1)
     }
-}
-
-/// Typical depth of an observation, metres; 2 where nothing was measured.
-fn typical_depth(seen: &Observation) -> f64 {
-    let mut depths: Vec<f32> = seen.depth.iter().copied().filter(|depth| *depth > 0.0).step_by(7).collect();
-    if depths.is_empty() {
-        return 2.0;
-    }
-    let middle = depths.len() / 2;
-    f64::from(*depths.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 /// The numbers below `count` in an order that depends on seed and round only (Fisher and Yates 1938).

@@ -4,6 +4,7 @@ use mba_tracker::geometry::RigidTransform;
 
 use super::adjustment::BundleAdjustment;
 use super::map_model::MapModel;
+use super::mapped_frame::MappedFrame;
 use super::world_moves::WorldMoves;
 
 impl<M: MapModel> BundleAdjustment<M> {
@@ -11,17 +12,16 @@ impl<M: MapModel> BundleAdjustment<M> {
     /// of the map move with the keyframes that they belong to.
     pub fn move_keyframes(&mut self, world_from_keyframe: &[RigidTransform]) -> WorldMoves {
         let mut moves = WorldMoves::default();
-        let both = self.keyframes.iter_mut().zip(&mut self.state.frames).zip(world_from_keyframe);
-        for ((keyframe, frame), new_world_from_keyframe) in both {
-            let new_world_from_world = new_world_from_keyframe.compose(&frame.path.mid().inverse());
-            frame.path = frame.path.seen_from(&new_world_from_world);
+        for (frame, new_world_from_keyframe) in self.frames.iter_mut().zip(world_from_keyframe) {
+            let MappedFrame { keyframe, state } = frame;
+            let new_world_from_world = new_world_from_keyframe.compose(&state.path.mid().inverse());
+            state.path = state.path.seen_from(&new_world_from_world);
             keyframe.prior.middle = new_world_from_world.compose(&keyframe.prior.middle);
             moves.push(keyframe.index, new_world_from_world);
         }
-        let map = &mut self.state.map;
-        map.move_along(&moves);
-        for (keyframe, frame) in self.keyframes.iter().zip(&self.state.frames) {
-            map.make_room(keyframe.observation.level(0), &frame.path.mid());
+        self.map.move_along(&moves);
+        for MappedFrame { keyframe, state } in &self.frames {
+            self.map.make_room(keyframe.observation.level(0), &state.path.mid());
         }
         moves
     }

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use mba_adjust::bundle::{BundleAdjustment, BundleState, MapModel};
+use mba_adjust::bundle::{BorrowedBundleState, BundleAdjustment, BundleState, MapModel};
 use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, load, save};
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;
@@ -44,7 +44,7 @@ pub struct MapProgress {
 }
 
 /// All that is needed to go on.
-#[derive(Serialize, Deserialize)]
+#[derive(Deserialize)]
 struct Saved {
     state: BundleState,
     running: Running,
@@ -53,7 +53,7 @@ struct Saved {
 /// The same as it is written.
 #[derive(Serialize)]
 struct Saving<'a> {
-    state: &'a BundleState,
+    state: BorrowedBundleState<'a>,
     running: Running,
 }
 
@@ -141,10 +141,13 @@ impl Work<'_> {
         let mut bundle = prepare::bundle(dataset, &mut frames, &chosen, settings)?;
         let mut running = Running::default();
         match saved {
-            Some(saved) => (bundle.state, running) = (saved.state, saved.running),
+            Some(saved) => {
+                bundle.restore(saved.state);
+                running = saved.running;
+            }
             None => bundle.seed(),
         }
-        if bundle.state.map.is_empty() {
+        if bundle.map.is_empty() {
             return Err(MapError::NoDepth);
         }
         // Not before it is known that there will be a map: this replaces an earlier one.
@@ -154,8 +157,9 @@ impl Work<'_> {
         output::push_tracked(&mut writer, &frames)?;
         let earlier = running.seconds;
         let budget = settings.time_budget.map(|budget| budget.as_secs_f64() * (1.0 - BUDGET_RESERVE));
-        let keep =
-            |state: &BundleState, running: Running| save(&checkpoint, &identity, &Saving { state, running });
+        let keep = |state: BorrowedBundleState<'_>, running: Running| {
+            save(&checkpoint, &identity, &Saving { state, running })
+        };
         let checkpoint = Checkpoint { interval: settings.checkpoint_interval, keep: &keep };
         let adjustment = Adjustment { budget, checkpoint: Some(checkpoint), started, earlier };
         adjustment.run(&mut bundle, &mut running, &mut observe)?;
@@ -224,13 +228,13 @@ impl Conclusion<'_> {
             Some(_) => MapFigures::default(),
         };
         let figures = MapFigures {
-            gaussians: bundle.state.map.size().gaussians(),
+            gaussians: bundle.map.size().gaussians(),
             map_file_bytes: writer.map_bytes(),
-            iterations: bundle.state.steps,
+            iterations: bundle.progress().steps,
             seconds: running.seconds + started.elapsed().as_secs_f64(),
             peak_memory_bytes: output::peak_memory_bytes(),
             loss: running.loss,
-            keyframes: bundle.keyframes().len(),
+            keyframes: bundle.frames.len(),
             predicted_frames: predicted.frames,
             predicted_psnr: predicted.psnr(),
             ..pictures
@@ -270,7 +274,7 @@ pub(crate) struct Checkpoint<'a> {
 }
 
 /// Writes a checkpoint of a bundle and of what the loop keeps besides.
-type Keep<'a> = dyn Fn(&BundleState, Running) -> Result<(), CheckpointError> + 'a;
+type Keep<'a> = dyn Fn(BorrowedBundleState<'_>, Running) -> Result<(), CheckpointError> + 'a;
 
 impl Adjustment<'_> {
     pub(super) fn run(
@@ -281,8 +285,8 @@ impl Adjustment<'_> {
     ) -> Result<(), MapError> {
         // The first checkpoint follows the first step: reading the frames is not to be lost either.
         let mut last_saved: Option<Instant> = None;
-        while bundle.state.position < 1.0 {
-            let steps = bundle.state.scheduled_steps + 1;
+        while bundle.progress().position < 1.0 {
+            let steps = bundle.progress().scheduled_steps + 1;
             let report = bundle.step(self.budget.is_some(), |schedule| match self.budget {
                 None => steps as f64 / schedule.steps().max(1) as f64,
                 Some(budget) => self.seconds() / budget,
@@ -290,9 +294,9 @@ impl Adjustment<'_> {
             let Some(report) = report else { break };
             running.add(report.terms.total(), report.terms.mean_square, steps);
             let flow = observe(MapProgress {
-                position: bundle.state.position.min(1.0),
-                steps: bundle.state.steps,
-                size: bundle.state.map.size(),
+                position: bundle.progress().position.min(1.0),
+                steps: bundle.progress().steps,
+                size: bundle.map.size(),
                 loss: running.loss,
                 psnr: -10.0 * running.mean_square.log10(),
             });
@@ -323,7 +327,7 @@ impl Adjustment<'_> {
         running: &Running,
     ) -> Result<(), MapError> {
         let running = Running { seconds: self.seconds(), ..*running };
-        Ok((checkpoint.keep)(&bundle.state, running)?)
+        Ok((checkpoint.keep)(bundle.state(), running)?)
     }
 }
 

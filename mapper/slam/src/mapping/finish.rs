@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use mba_adjust::bundle::{BundleAdjustment, DepthSource, Schedule};
+use mba_adjust::bundle::{BundleAdjustment, DepthSource, MappedFrame, Schedule};
 use mba_io::dataset::Dataset;
 use mba_io::trajectory_file::TimedExposure;
 use mba_map::map::MapKind;
@@ -41,9 +41,9 @@ impl<'a> Finish<'a> {
         settings: &'a MapSettings,
     ) -> Result<Self, MapError> {
         let frames = Frames::of(dataset, exposures, records, settings.continuity)?;
-        for k in 0..bundle.keyframes().len() {
-            let index = bundle.keyframes()[k].index;
-            bundle.set_prior(k, frames.priors[index]);
+        for k in 0..bundle.frames.len() {
+            let keyframe = &mut bundle.frames[k].keyframe;
+            keyframe.prior = frames.priors[keyframe.index];
             bundle.seed_from(k, DepthSource::Completed);
         }
         bundle.change_density();
@@ -61,12 +61,12 @@ impl<'a> Finish<'a> {
         (settings, schedule_steps): (&'a MapSettings, usize),
     ) -> Result<Self, MapError> {
         let frames = Frames::of(dataset, exposures, records, settings.continuity)?;
-        for k in 0..bundle.keyframes().len() {
-            bundle.set_prior(k, frames.priors[bundle.keyframes()[k].index]);
+        for MappedFrame { keyframe, .. } in &mut bundle.frames {
+            keyframe.prior = frames.priors[keyframe.index];
         }
         bundle.set_schedule(match settings.kind {
             MapKind::Gaussians => Schedule::finish(schedule_steps),
-            MapKind::Field => Schedule::field(bundle.keyframes().len()),
+            MapKind::Field => Schedule::field(bundle.frames.len()),
         });
         Ok(Self { dataset, settings, frames })
     }
@@ -94,16 +94,16 @@ impl<'a> Finish<'a> {
 
 /// The schedule of a map that has grown. A field learns with many cheap steps, as many as from nothing.
 fn schedule(bundle: &BundleAdjustment) -> Schedule {
-    match bundle.state.map.kind() {
+    match bundle.map.kind() {
         MapKind::Gaussians => Schedule::finish(steps(bundle)),
-        MapKind::Field => Schedule::field(bundle.keyframes().len()),
+        MapKind::Field => Schedule::field(bundle.frames.len()),
     }
 }
 
 /// Steps of the schedule: the effort of all keyframes, of which each step takes what its views cost.
 fn steps(bundle: &BundleAdjustment) -> usize {
     let plan = Schedule::finish(1).plan(0.0, false);
-    let keyframes = bundle.keyframes().len();
+    let keyframes = bundle.frames.len();
     let cost: f64 = (0..keyframes).map(|k| bundle.views(k, &plan) as f64 + STEP_COST).sum();
     let mean_cost = cost / keyframes.max(1) as f64;
     ((EFFORT * keyframes as f64 / mean_cost) as usize).max(LEAST_STEPS)

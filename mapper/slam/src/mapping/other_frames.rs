@@ -88,7 +88,7 @@ pub(super) fn all_exposures(
     settings: &MapSettings,
     fitted: Fitted<'_>,
 ) -> AllFrames {
-    let keyframes: Vec<usize> = bundle.keyframes().iter().map(|keyframe| keyframe.index).collect();
+    let keyframes: Vec<usize> = bundle.frames.iter().map(|frame| frame.keyframe.index).collect();
     let sensor = sensor(dataset);
     let mut all = Vec::with_capacity(dataset.len());
     let mut predicted = Prediction::default();
@@ -96,18 +96,18 @@ pub(super) fn all_exposures(
         // Keyframes were refined themselves.
         let next = keyframes.partition_point(|keyframe| *keyframe < index).min(keyframes.len() - 1);
         if keyframes[next] == index {
-            let state = &bundle.state.frames[next];
+            let state = &bundle.frames[next].state;
             all.push((frames.exposure_of(index, state), state.log_gain));
             continue;
         }
         // Others move along with the keyframe next to them, as far as it was moved.
         let nearest = nearest(&keyframes, next, index);
         let before = &frames.exposures[keyframes[nearest]].mid;
-        let reference = &bundle.state.frames[nearest];
-        let moved: RigidTransform = reference.path.mid().compose(&before.inverse());
+        let reference = &bundle.frames[nearest];
+        let moved: RigidTransform = reference.state.path.mid().compose(&before.inverse());
         let mut state = frames.state(index, settings);
         state.path = state.path.seen_from(&moved);
-        state.log_gain = reference.log_gain;
+        state.log_gain = reference.state.log_gain;
         if fitted.includes(index, frames.records[index].status)
             && let Ok(observation) = observation(dataset, &sensor, index)
         {
@@ -116,12 +116,9 @@ pub(super) fn all_exposures(
                 observation,
                 PathPrior { middle: state.path.ends.mid(), ..frames.priors[index] },
             );
-            let known = &bundle.keyframes()[nearest].observation;
             // The gain from the same surfaces in both pictures, where exposure control changed it noticeably.
             let here = Placed { seen: unmapped.observation.level(1), world_from_camera: state.path.mid() };
-            let there =
-                Placed { seen: known.level(1), world_from_camera: bundle.state.frames[nearest].path.mid() };
-            if let Some(ratio) = log_brightness(&sensor.inverse_response, there, here)
+            if let Some(ratio) = log_brightness(&sensor.inverse_response, reference.placed(1), here)
                 && ratio.abs() > NOTICEABLE
             {
                 state.log_gain += ratio;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use mba_adjust::bundle::BundleAdjustment;
+use mba_adjust::bundle::{BundleAdjustment, MappedFrame};
 use mba_adjust::deblurring::{DeblurMemory, KeyframeDeblurrer, LONGEST_BLUR, Reblurred};
 use mba_io::dataset::{Dataset, RgbdFrame};
 use mba_io::trajectory_file::TimedExposure;
@@ -37,14 +37,14 @@ pub(super) fn write(
     refined: &[(TimedExposure, f64)],
 ) -> Result<(), RunError> {
     let mut is_keyframe = vec![false; exposures.len()];
-    bundle.keyframes().iter().for_each(|keyframe| is_keyframe[keyframe.index] = true);
+    bundle.frames.iter().for_each(|frame| is_keyframe[frame.keyframe.index] = true);
     for (index, (exposure, (_, log_gain))) in exposures.iter().zip(refined).enumerate() {
         writer.record_mut().refine(index, *exposure, log_gain.exp(), is_keyframe[index]);
     }
     write_map(writer, dataset, bundle)?;
     let config = tracker_config(dataset, &TrackingOptions::default());
     let deblurrer = KeyframeDeblurrer::new(&config, dataset.simd());
-    let count = bundle.keyframes().len();
+    let count = bundle.frames.len();
     for first in (0..count).step_by(TOGETHER) {
         let keyframes = first..count.min(first + TOGETHER);
         // The map renders one picture after the other, on all threads; deblurring then takes one per thread.
@@ -68,8 +68,8 @@ pub(super) fn write(
 
 /// Writes the map; Gaussians with colours for viewers, too.
 fn write_map(writer: &RunWriter, dataset: &Dataset, bundle: &BundleAdjustment) -> Result<(), RunError> {
-    let Scene::Gaussians(map) = Scene::from(&bundle.state.map) else {
-        return writer.write_map(&bundle.state.map);
+    let Scene::Gaussians(map) = Scene::from(&bundle.map) else {
+        return writer.write_map(&bundle.map);
     };
     let calibration = dataset.calibration();
     let response = calibration.response.inverse();
@@ -112,7 +112,7 @@ impl<'a> Pictures<'a> {
     fn renderer(&self) -> ViewRenderer<'a> {
         let calibration = self.dataset.calibration();
         let response = calibration.response.inverse();
-        let (simd, map) = (self.dataset.simd(), &self.bundle.state.map);
+        let (simd, map) = (self.dataset.simd(), &self.bundle.map);
         ViewRenderer::new(simd, map, calibration.camera, &response, calibration.depth_scale)
             .through(self.bundle.sensor().falloff.clone())
     }
@@ -125,10 +125,10 @@ impl<'a> Pictures<'a> {
         explained: &Explained,
         (renderer, memory): &mut (ViewRenderer<'_>, DeblurMemory),
     ) -> Result<(), RunError> {
-        let (keyframe, frame) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
+        let MappedFrame { keyframe, state } = &self.bundle.frames[k];
         let colour = &keyframe.observation.level(0).colour;
-        let behind = Behind::Captured { colour, gain: frame.log_gain.exp() as f32 };
-        let view = renderer.render(&frame.path.mid(), behind);
+        let behind = Behind::Captured { colour, gain: state.log_gain.exp() as f32 };
+        let view = renderer.render(&state.path.mid(), behind);
         writer.write_depth(keyframe.index, view.size, &view.depth)?;
         let Explained::Picture(reblurred) = explained else {
             return writer.write_deblurred(keyframe.index, view.size, view.rgb);

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use mba_adjust::bundle::{BundleAdjustment, MapKeyframe};
+use mba_adjust::bundle::{BundleAdjustment, MapKeyframe, MappedFrame};
 use mba_raster::exposure::ExposurePath;
 use mba_tracker::geometry::RigidTransform;
 use nalgebra::{Matrix6, Vector6};
@@ -47,8 +47,7 @@ pub struct MappedKeyframe {
 
 /// The keyframes of a finished bundle.
 pub(super) fn mapped_keyframes(bundle: &BundleAdjustment, frames: &Frames) -> Vec<MappedKeyframe> {
-    let keyframes = bundle.keyframes().iter().zip(&bundle.state.frames);
-    let mapped = keyframes.map(|(keyframe, state)| MappedKeyframe {
+    let mapped = bundle.frames.iter().map(|MappedFrame { keyframe, state }| MappedKeyframe {
         index: keyframe.index,
         world_from_camera: frames.exposure_of(keyframe.index, state).mid,
         log_gain: state.log_gain,

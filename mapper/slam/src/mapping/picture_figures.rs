@@ -81,10 +81,10 @@ pub(super) fn of_bundle(
     folder: &Path,
     exposures: &[TimedExposure],
 ) -> MapFigures {
-    let captured =
-        bundle.keyframes().iter().map(|keyframe| (keyframe.index, keyframe.observation.level(0).rgb()));
+    let keyframes = bundle.frames.iter().map(|frame| &frame.keyframe);
+    let captured = keyframes.map(|keyframe| (keyframe.index, keyframe.observation.level(0).rgb()));
     let keyframes = keyframe_scores(dataset, captured, folder);
-    figures(keyframes, held_out_scores(dataset, (&bundle.state.map).into(), exposures))
+    figures(keyframes, held_out_scores(dataset, (&bundle.map).into(), exposures))
 }
 
 fn figures([captured, deblurred]: [Scores; 2], [held_out, mapped]: [Scores; 2]) -> MapFigures {

@@ -1,7 +1,7 @@
 //! From a run to a bundle that can be adjusted.
 
 use mba_adjust::bundle::{
-    BundleAdjustment, FrameState, MapKeyframe, NOTICEABLE, PathPrior, Placed, log_brightness,
+    BundleAdjustment, FrameState, MapKeyframe, MappedFrame, NOTICEABLE, PathPrior, log_brightness,
 };
 use mba_adjust::continuity::{ContinuitySettings, FrameVerdict, Suspicion, predict_motions};
 use mba_io::dataset::Dataset;
@@ -177,22 +177,23 @@ pub(super) fn bundle(
     // Images are read side by side, and kept in the order of the frames.
     let load = |&index: &usize| (index, observation(dataset, &sensor, index));
     let loaded: Vec<_> = chosen.par_iter().map(load).collect();
-    let mut keyframes = Vec::new();
+    let mut mapped = Vec::new();
     for (index, observation) in loaded {
         match observation {
-            Ok(observation) => keyframes.push(MapKeyframe::new(index, observation, frames.priors[index])),
+            Ok(observation) => mapped.push(MappedFrame {
+                keyframe: MapKeyframe::new(index, observation, frames.priors[index]),
+                state: frames.state(index, settings),
+            }),
             Err(reason) => frames.warnings.push(format!("keyframe {index} left out: {reason}")),
         }
     }
-    if keyframes.is_empty() {
+    if mapped.is_empty() {
         let reason = frames.warnings.last().cloned().unwrap_or_else(|| "all frames are lost".to_owned());
         return Err(MapError::NoKeyframe(reason));
     }
-    let mut states: Vec<FrameState> =
-        keyframes.iter().map(|keyframe| frames.state(keyframe.index, settings)).collect();
-    set_gains(&sensor, &keyframes, &mut states);
+    set_gains(&sensor, &mut mapped);
     let picture = sensor.camera.width * sensor.camera.height;
-    let mut bundle = BundleAdjustment::new(dataset.simd(), sensor, settings.bundle(), keyframes, states);
+    let mut bundle = BundleAdjustment::new(dataset.simd(), sensor, settings.bundle(), mapped);
     if settings.max_gaussians.is_none() {
         bundle.set_max_gaussians(bundle.seen_surface().gaussians(picture));
     }
@@ -201,14 +202,11 @@ pub(super) fn bundle(
 
 /// First estimates of the gains, from keyframe to keyframe, where they differ by more than the adjustment finds itself.
 /// The map is as bright as the median keyframe.
-fn set_gains(sensor: &Sensor, keyframes: &[MapKeyframe], states: &mut [FrameState]) {
-    let ratios: Vec<f64> = (1..keyframes.len())
-        .into_par_iter()
-        .map(|k| {
-            let [before, here] = [k - 1, k].map(|k| Placed {
-                seen: keyframes[k].observation.level(1),
-                world_from_camera: states[k].path.mid(),
-            });
+fn set_gains(sensor: &Sensor, mapped: &mut [MappedFrame]) {
+    let ratios: Vec<f64> = mapped
+        .par_windows(2)
+        .map(|pair| {
+            let [before, here] = [0, 1].map(|k| pair[k].placed(1));
             log_brightness(&sensor.inverse_response, before, here).unwrap_or(0.0)
         })
         .collect();
@@ -217,7 +215,10 @@ fn set_gains(sensor: &Sensor, keyframes: &[MapKeyframe], states: &mut [FrameStat
     ratios.iter().for_each(|ratio| log_gains.push(log_gains[log_gains.len() - 1] + ratio));
     if log_gains.iter().any(|log_gain| log_gain.abs() > NOTICEABLE) {
         let median = quantile(&log_gains, 0.5).unwrap_or(0.0);
-        states.iter_mut().zip(log_gains).for_each(|(state, log_gain)| state.log_gain = log_gain - median);
+        mapped
+            .iter_mut()
+            .zip(log_gains)
+            .for_each(|(frame, log_gain)| frame.state.log_gain = log_gain - median);
     }
 }
 

@@ -120,7 +120,7 @@ impl BackEnd {
             instructions,
             seconds,
         };
-        let saved = keeper.save_growing(parts, &self.map.bundle.state);
+        let saved = keeper.save_growing(parts, self.map.bundle.state());
         self.keeper = Some(keeper);
         Ok(saved?)
     }
@@ -169,8 +169,8 @@ impl BackEnd {
             }
             let flow = observe(SlamProgress::Frames {
                 frames: self.writer.record().exposures().len(),
-                keyframes: self.map.bundle.keyframes().len(),
-                map: self.map.bundle.state.map.size(),
+                keyframes: self.map.bundle.frames.len(),
+                map: self.map.bundle.map.size(),
                 loops: self.loops.closed(),
             });
             if flow.is_break() || self.keeper.as_ref().is_some_and(Keeper::is_due) {
@@ -302,9 +302,8 @@ impl BackEnd {
     fn judge(&mut self, pose: &RigidTransform, image: &RgbdFrame) -> (bool, Option<SharpView>) {
         let relocaliser = self.loops.relocaliser();
         let Some(keyframe) = self.map.nearest_other(pose, image.index) else { return (false, None) };
-        let bundle = &self.map.bundle;
-        let (known, state) = (&bundle.keyframes()[keyframe], &bundle.state.frames[keyframe]);
-        let keyframe_view = relocaliser.keyframe_view(known, state, self.map.sensor.depth_scale);
+        let keyframe = &self.map.bundle.frames[keyframe];
+        let keyframe_view = relocaliser.keyframe_view(keyframe, self.map.sensor.depth_scale);
         let mut residual = |view: &SharpView| {
             relocaliser.align_to(image, view, pose).map(|measurement| measurement.residual)
         };

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::thread;
 use std::time::Instant;
 
-use mba_adjust::bundle::{BundleAdjustment, BundleState, MapModel};
+use mba_adjust::bundle::{BorrowedBundleState, BundleAdjustment, BundleState, MapModel, MappedFrame};
 use mba_io::checkpoint::load;
 use mba_io::dataset::Dataset;
 use mba_io::output::OutputFolder;
@@ -125,7 +125,7 @@ impl SlamRun<'_> {
             writer.record_mut().warn(lag.to_string());
         }
         self.stand_upright(&mut grown.bundle, writer.record_mut());
-        if grown.bundle.state.map.is_empty() {
+        if grown.bundle.map.is_empty() {
             return Err(MapError::NoDepth.into());
         }
         let figures = SlamFigures {
@@ -144,9 +144,8 @@ impl SlamRun<'_> {
         else {
             return;
         };
-        let frames = &bundle.state.frames;
-        let poses: Vec<_> =
-            frames.iter().map(|frame| upright_from_world.compose(&frame.path.mid())).collect();
+        let upright = |frame: &MappedFrame| upright_from_world.compose(&frame.state.path.mid());
+        let poses: Vec<_> = bundle.frames.iter().map(upright).collect();
         bundle.move_keyframes(&poses);
         track.move_world(|_| upright_from_world);
         track.set_upright(how);
@@ -164,8 +163,9 @@ impl SlamRun<'_> {
         let images = keyframe_images(self.dataset, &parts.keyframes)?;
         let keyframes = keyframes(&sensor, &parts.keyframes, &images)?;
         let settings = self.settings.mapping().bundle();
-        let frames = state.frames.clone();
-        let mut bundle = BundleAdjustment::new(self.dataset.simd(), sensor, settings, keyframes, frames);
+        let both = keyframes.into_iter().zip(&state.frames);
+        let frames = both.map(|(keyframe, state)| MappedFrame { keyframe, state: state.clone() }).collect();
+        let mut bundle = BundleAdjustment::new(self.dataset.simd(), sensor, settings, frames);
         bundle.set_max_gaussians(parts.max_gaussians);
         writer.restore(parts.rows)?;
         let Counts { frames_on_map, late_frames, relocalisations } = parts.counts;
@@ -193,7 +193,7 @@ impl SlamRun<'_> {
         let Refinement { mut bundle, mut writer, keeper, figures, stopped, started, earlier } = refinement;
         // A run that is stopped from here on has a map, and poses to evaluate.
         writer.replace_earlier()?;
-        writer.write_map(stopped.as_ref().map_or(&bundle.state.map, |(_, _, state)| &state.map))?;
+        writer.write_map(stopped.as_ref().map_or(&bundle.map, |(_, _, state)| &state.map))?;
         writer.flush()?;
         let (dataset, mapping) = (self.dataset, self.settings.mapping());
         let (exposures, records) = (writer.record().exposures(), writer.record().frames());
@@ -201,13 +201,13 @@ impl SlamRun<'_> {
             None => (Finish::new(dataset, &mut bundle, exposures, records, &mapping)?, Running::default()),
             Some((steps, running, state)) => {
                 let finish = Finish::resume(dataset, &mut bundle, exposures, records, (&mapping, steps))?;
-                bundle.state = state;
+                bundle.restore(state);
                 (finish, running)
             }
         };
         let seconds = || earlier + started.elapsed().as_secs_f64();
         let parts = refining_parts(&bundle, &writer, &figures);
-        let keep = |state: &BundleState, running: Running| match &keeper {
+        let keep = |state: BorrowedBundleState<'_>, running: Running| match &keeper {
             Some(keeper) => {
                 let parts = RefiningParts { running, seconds: seconds(), ..parts.clone() };
                 keeper.write(&Saving::Refining { parts: &parts, state })
@@ -235,7 +235,7 @@ fn refining_parts(bundle: &BundleAdjustment, writer: &RunWriter, figures: &SlamF
     let SlamFigures { frames_on_map, late_frames, relocalisations, .. } = *figures;
     RefiningParts {
         rows: writer.record().rows(),
-        keyframes: bundle.keyframes().iter().map(SavedKeyframe::from).collect(),
+        keyframes: bundle.frames.iter().map(|frame| SavedKeyframe::from(&frame.keyframe)).collect(),
         max_gaussians: bundle.max_gaussians(),
         schedule_steps: bundle.schedule().steps(),
         running: Running::default(),

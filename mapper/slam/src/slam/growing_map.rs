@@ -1,8 +1,8 @@
 //! The map while frames come in.
 
 use mba_adjust::bundle::{
-    BundleAdjustment, BundleState, DepthSource, FrameState, MapKeyframe, MapModel, NOTICEABLE, PathPrior,
-    Placed, Schedule, log_brightness,
+    BundleAdjustment, BundleState, DepthSource, FrameState, MapKeyframe, MapModel, MappedFrame, NOTICEABLE,
+    PathPrior, Placed, Schedule, log_brightness,
 };
 use mba_io::dataset::RgbdFrame;
 use mba_io::trajectory_file::TimedExposure;
@@ -65,7 +65,7 @@ pub(super) struct GrowingMap {
 impl GrowingMap {
     pub(super) fn new(simd: SimdLevel, sensor: Sensor, settings: &SlamSettings) -> Self {
         let bundle_settings = settings.mapping().bundle();
-        let bundle = BundleAdjustment::new(simd, sensor.clone(), bundle_settings, Vec::new(), Vec::new());
+        let bundle = BundleAdjustment::new(simd, sensor.clone(), bundle_settings, Vec::new());
         let random = Pcg32::new(settings.seed, 0);
         Self {
             bundle,
@@ -89,9 +89,9 @@ impl GrowingMap {
     ) -> Self {
         let mut map = Self::new(simd, sensor, settings);
         for (keyframe, frame) in keyframes.into_iter().zip(&state.frames) {
-            map.bundle.push(keyframe, frame.clone());
+            map.bundle.frames.push(MappedFrame { keyframe, state: frame.clone() });
         }
-        map.bundle.state = state;
+        map.bundle.restore(state);
         map.bundle.set_max_gaussians(max_gaussians);
         // Every second step draws a number.
         map.random.advance(growth.steps as u64 / 2);
@@ -106,7 +106,7 @@ impl GrowingMap {
 
     /// The keyframes, as a checkpoint keeps them.
     pub(super) fn saved_keyframes(&self) -> Vec<SavedKeyframe> {
-        self.bundle.keyframes().iter().map(SavedKeyframe::from).collect()
+        self.bundle.frames.iter().map(|frame| SavedKeyframe::from(&frame.keyframe)).collect()
     }
 
     /// Takes a tracked frame in, as a keyframe if it shows something new; returns whether it does.
@@ -127,13 +127,15 @@ impl GrowingMap {
         let mut state = FrameState::new(path);
         // The gain of the keyframe next to it, but for what exposure control changed.
         state.log_gain = near.first().map_or(0.0, |near| self.log_gain(near.keyframe, &observation, &state));
-        self.bundle.push(MapKeyframe::new(image.index, observation, prior), state);
+        let keyframe = MapKeyframe::new(image.index, observation, prior);
+        self.bundle.frames.push(MappedFrame { keyframe, state });
         self.seed();
         // One in, one out, when there is no more room.
-        if self.bundle.keyframes().len() > self.settings.max_keyframes.max(2)
+        if self.bundle.frames.len() > self.settings.max_keyframes.max(2)
             && let Some(k) = most_dispensable(&self.bundle, &camera)
         {
-            self.bundle.remove_keyframe(k);
+            // What the map learnt from it stays.
+            self.bundle.frames.remove(k);
             self.retired += 1;
         }
         true
@@ -141,12 +143,11 @@ impl GrowingMap {
 
     /// Logarithm of the gain of a new frame, told from keyframe `k` near it.
     fn log_gain(&self, k: usize, observation: &ObservationPyramid, frame: &FrameState) -> f64 {
-        let (known, state) = (&self.bundle.keyframes()[k], &self.bundle.state.frames[k]);
-        let there = Placed { seen: known.observation.level(COARSE), world_from_camera: state.path.mid() };
+        let known = &self.bundle.frames[k];
         let here = Placed { seen: observation.level(COARSE), world_from_camera: frame.path.mid() };
         // What the adjustment finds itself is left to it.
-        let ratio = log_brightness(&self.sensor.inverse_response, there, here).unwrap_or(0.0);
-        state.log_gain + if ratio.abs() > NOTICEABLE { ratio } else { 0.0 }
+        let ratio = log_brightness(&self.sensor.inverse_response, known.placed(COARSE), here).unwrap_or(0.0);
+        known.state.log_gain + if ratio.abs() > NOTICEABLE { ratio } else { 0.0 }
     }
 
     /// The path over all the time in which anything of a frame was measured.
@@ -157,10 +158,10 @@ impl GrowingMap {
 
     /// Takes a better estimate of a frame that may be a keyframe.
     pub(super) fn revise(&mut self, index: usize, exposure: &TimedExposure) {
-        let known = self.bundle.keyframes().iter().position(|keyframe| keyframe.index == index);
-        if let Some(k) = known.filter(|_| self.settings.blur) {
-            let exposure_share = self.bundle.keyframes()[k].observation.level(0).times.exposure;
-            self.bundle.state.frames[k].path = long_path(exposure, 1.0 / exposure_share);
+        let known = self.bundle.frames.iter_mut().find(|frame| frame.keyframe.index == index);
+        if let Some(MappedFrame { keyframe, state }) = known.filter(|_| self.settings.blur) {
+            let exposure_share = keyframe.observation.level(0).times.exposure;
+            state.path = long_path(exposure, 1.0 / exposure_share);
         }
     }
 
@@ -173,17 +174,17 @@ impl GrowingMap {
     /// nearby were given up or the camera has just come.
     pub(super) fn nearest_other(&self, world_from_camera: &RigidTransform, index: usize) -> Option<usize> {
         let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
-        let nearest = near.iter().find(|near| self.bundle.keyframes()[near.keyframe].index != index)?;
+        let nearest = near.iter().find(|near| self.bundle.frames[near.keyframe].keyframe.index != index)?;
         let is_near = nearest.pixels <= NEARBY * self.sensor.camera.width as f64;
         is_near.then_some(nearest.keyframe)
     }
 
     /// Adds what the newest keyframe shows, and allows the map to grow accordingly.
     fn seed(&mut self) {
-        let newest = self.bundle.keyframes().len() - 1;
+        let newest = self.bundle.frames.len() - 1;
         let pixels = (self.sensor.camera.width * self.sensor.camera.height) as f64;
         let most = self.settings.max_gaussians.unwrap_or(usize::MAX);
-        let pose = self.bundle.state.frames[newest].path.mid();
+        let pose = self.bundle.frames[newest].state.path.mid();
         self.seen += if newest == 0 { 1.0 } else { self.bundle.uncovered_fraction(&pose, COARSE) };
         let by_area = (self.seen * pixels) as usize / PIXELS_PER_GAUSSIAN;
         self.bundle.set_max_gaussians(by_area.max(2000).min(most));
@@ -192,7 +193,7 @@ impl GrowingMap {
 
     /// A frame's share of the work, around a pose: steps as long as `goes_on` with the effort that is left.
     pub(super) fn work(&mut self, world_from_camera: &RigidTransform, mut goes_on: impl FnMut(f64) -> bool) {
-        if self.bundle.state.map.is_empty() {
+        if self.bundle.map.is_empty() {
             return;
         }
         let near = neighbours(&self.bundle, world_from_camera, &self.sensor.camera);
@@ -200,7 +201,7 @@ impl GrowingMap {
         self.effort = self.effort.min(0.0) + EFFORT;
         while goes_on(self.effort) {
             let k = self.next_keyframe(&near);
-            let plan = Schedule::growing(self.bundle.state.frames[k].visits);
+            let plan = Schedule::growing(self.bundle.frames[k].state.visits);
             let report = self.bundle.visit(k, &plan);
             self.effort -= report.views as f64 + STEP_COST;
             self.steps += 1;
@@ -213,7 +214,7 @@ impl GrowingMap {
     /// In turn the least visited of the window around the camera, and any one: what was learnt before must not be
     /// forgotten.
     fn next_keyframe(&mut self, near: &[Neighbour]) -> usize {
-        let visits = |near: &&Neighbour| self.bundle.state.frames[near.keyframe].visits;
+        let visits = |near: &&Neighbour| self.bundle.frames[near.keyframe].state.visits;
         let local = near.iter().take(WINDOW).min_by_key(visits).map_or(0, |near| near.keyframe);
         if self.steps.is_multiple_of(2) {
             return local;

@@ -4,7 +4,7 @@ use mba_raster::exposure::blur_length;
 use mba_tracker::geometry::{PinholeCamera, RigidTransform};
 use mba_tracker::trajectory::ExposureTrajectory;
 
-use mba_adjust::bundle::BundleAdjustment;
+use mba_adjust::bundle::{BundleAdjustment, MappedFrame};
 
 /// Movement of the picture from the nearest keyframe that makes a new view, as a fraction of the width.
 const NEW_VIEW: f64 = 0.01;
@@ -39,13 +39,12 @@ pub(super) fn neighbours(
     world_from_camera: &RigidTransform,
     camera: &PinholeCamera,
 ) -> Vec<Neighbour> {
-    let states = bundle.keyframes().iter().zip(&bundle.state.frames).enumerate();
-    let mut all: Vec<Neighbour> = states
-        .map(|(keyframe, (known, state))| Neighbour {
-            keyframe,
-            pixels: view_change(world_from_camera, &state.path.mid(), camera, known.depth),
-        })
-        .collect();
+    let pixels = |MappedFrame { keyframe, state }: &MappedFrame| {
+        view_change(world_from_camera, &state.path.mid(), camera, keyframe.depth)
+    };
+    let frames = bundle.frames.iter().enumerate();
+    let mut all: Vec<Neighbour> =
+        frames.map(|(keyframe, frame)| Neighbour { keyframe, pixels: pixels(frame) }).collect();
     all.sort_by(|a, b| a.pixels.total_cmp(&b.pixels).then(b.keyframe.cmp(&a.keyframe)));
     all
 }
@@ -66,9 +65,9 @@ pub(super) fn is_worth_it(
 /// The keyframe that is missed the least: the one whose neighbour shows nearly the same, and of such two the more
 /// blurred. Never the first, which says where the world is, nor the last.
 pub(super) fn most_dispensable(bundle: &BundleAdjustment, camera: &PinholeCamera) -> Option<usize> {
-    let last = bundle.keyframes().len().checked_sub(1)?;
+    let last = bundle.frames.len().checked_sub(1)?;
     let loneliness = |k: usize| {
-        let near = neighbours(bundle, &bundle.state.frames[k].path.mid(), camera);
+        let near = neighbours(bundle, &bundle.frames[k].state.path.mid(), camera);
         let other = near.iter().find(|near| near.keyframe != k).map_or(f64::INFINITY, |near| near.pixels);
         other / (1.0 + bundle.blur_px(k))
     };

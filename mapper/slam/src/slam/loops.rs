@@ -1,5 +1,6 @@
 //! Places that are seen again: the drift since, and the way back for a tracker that is lost.
 
+use mba_adjust::bundle::MappedFrame;
 use mba_adjust::places::{PlaceDescriptor, PlaceIndex};
 use mba_adjust::pose_graph::{PoseGraph, PoseGraphEdge, PoseGraphSettings};
 use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
@@ -96,7 +97,7 @@ impl Loops {
 
     /// Remembers the newest keyframe, and forgets those that the map has given up.
     pub(super) fn remember(&mut self, map: &GrowingMap, image: &RgbdFrame) {
-        let known = |id: usize| map.bundle.keyframes().iter().any(|keyframe| keyframe.index == id);
+        let known = |id: usize| map.bundle.frames.iter().any(|frame| frame.keyframe.index == id);
         self.places.retain(known);
         if let Ok(descriptor) = PlaceDescriptor::new(&image.rgb, &map.sensor.camera) {
             self.places.push(image.index, descriptor);
@@ -116,18 +117,19 @@ impl Loops {
             self.pause -= 1;
             return None;
         }
-        let keyframes = map.bundle.keyframes();
-        let newest = keyframes.len().checked_sub(1)?;
+        let frames = &map.bundle.frames;
+        let newest = frames.len().checked_sub(1)?;
         // Keyframes just before are always similar, and say nothing about drift.
         let recent = match map.retired {
             0 => RECENT,
-            _ => RECENT.min((RECENT_SHARE * keyframes.len() as f64) as usize),
+            _ => RECENT.min((RECENT_SHARE * frames.len() as f64) as usize),
         };
-        let old: Vec<usize> = keyframes[..newest.saturating_sub(recent)].iter().map(|k| k.index).collect();
+        let old = &frames[..newest.saturating_sub(recent)];
+        let old: Vec<usize> = old.iter().map(|frame| frame.keyframe.index).collect();
         let (before, view, measurement) = self.recognise(map, image, |id| old.contains(&id))?;
         // Where the map says that the newest keyframe is, in pixels from where the old place says it is.
-        let now = map.bundle.state.frames[newest].path.mid();
-        let depth = keyframes[newest].depth;
+        let MappedFrame { keyframe, state } = &frames[newest];
+        let (now, depth) = (state.path.mid(), keyframe.depth);
         let camera = &map.sensor.camera;
         if view_change(&measurement.world_from_camera, &now, camera, depth) < DRIFT * camera.width as f64 {
             self.pause = PAUSE;
@@ -157,10 +159,9 @@ impl Loops {
         let descriptor = PlaceDescriptor::new(&image.rgb, &map.sensor.camera).ok()?;
         let candidates = self.places.candidates(&descriptor, MOST_CANDIDATES, MIN_SIMILARITY, is_eligible);
         candidates.into_iter().find_map(|candidate| {
-            let keyframes = map.bundle.keyframes();
-            let k = keyframes.iter().position(|keyframe| keyframe.index == candidate.id)?;
-            let state = &map.bundle.state.frames[k];
-            let view = self.relocaliser.keyframe_view(&keyframes[k], state, map.sensor.depth_scale);
+            let mut frames = map.bundle.frames.iter();
+            let frame = frames.find(|frame| frame.keyframe.index == candidate.id)?;
+            let view = self.relocaliser.keyframe_view(frame, map.sensor.depth_scale);
             let guess = view.world_from_camera.compose(&candidate.stored_from_query);
             let measurement = self.relocaliser.align_to(image, &view, &guess)?;
             Some((candidate.id, view, measurement))
@@ -169,8 +170,9 @@ impl Loops {
 
     /// Keyframes in the order of time, tied by their motions so far and by the places that were seen again.
     fn graph(&self, map: &GrowingMap) -> PoseGraph {
-        let states = &map.bundle.state.frames;
-        let world_from_keyframe: Vec<RigidTransform> = states.iter().map(|state| state.path.mid()).collect();
+        let frames = &map.bundle.frames;
+        let world_from_keyframe: Vec<RigidTransform> =
+            frames.iter().map(|frame| frame.state.path.mid()).collect();
         let odometry = world_from_keyframe.windows(2).enumerate().map(|(from, pair)| {
             let from_from_to = pair[0].inverse().compose(&pair[1]);
             // Drift grows with the way.
@@ -184,8 +186,7 @@ impl Loops {
                 robust: false,
             }
         });
-        let keyframes = map.bundle.keyframes();
-        let node = |index: usize| keyframes.iter().position(|keyframe| keyframe.index == index);
+        let node = |index: usize| frames.iter().position(|frame| frame.keyframe.index == index);
         let closures = self.closed.iter().filter_map(|closure| {
             Some(PoseGraphEdge {
                 from: node(closure.before)?,

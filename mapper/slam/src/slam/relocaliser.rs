@@ -1,6 +1,6 @@
 //! Aligning a frame with a sharp view outside of the tracking loop: to recognise a place, or to judge a view.
 
-use mba_adjust::bundle::{FrameState, MapKeyframe};
+use mba_adjust::bundle::MappedFrame;
 use mba_adjust::deblurring::{DeblurMemory, KeyframeDeblurrer};
 use mba_io::dataset::RgbdFrame;
 use mba_tracker::error::FrameError as TrackError;
@@ -66,8 +66,7 @@ impl Relocaliser {
     /// A keyframe as a sharp view: deblurred with its own motion.
     pub(super) fn keyframe_view(
         &mut self,
-        keyframe: &MapKeyframe,
-        state: &FrameState,
+        MappedFrame { keyframe, state }: &MappedFrame,
         depth_scale: f64,
     ) -> SharpView {
         // What was captured, without the blur of its refined path; as captured where that is not possible.

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use mba_adjust::bundle::{BundleState, MapKeyframe};
+use mba_adjust::bundle::{BorrowedBundleState, BundleState, MapKeyframe};
 use mba_io::checkpoint::exact_poses::{PoseNumbers, numbers, pose};
 use mba_io::checkpoint::{CheckpointError, Fingerprint, Identity, save};
 use mba_io::dataset::Dataset;
@@ -36,8 +36,8 @@ pub(super) enum Saved {
 /// The same as it is written.
 #[derive(Serialize)]
 pub(super) enum Saving<'a> {
-    Growing { mapper: Box<MapperParts>, state: &'a BundleState },
-    Refining { parts: &'a RefiningParts, state: &'a BundleState },
+    Growing { mapper: Box<MapperParts>, state: BorrowedBundleState<'a> },
+    Refining { parts: &'a RefiningParts, state: BorrowedBundleState<'a> },
 }
 
 /// What the mapper knows besides map and paths.
@@ -246,7 +246,7 @@ impl Keeper {
     pub(super) fn save_growing(
         &mut self,
         parts: impl FnOnce(VecDeque<(usize, SavedInstruction)>, f64) -> MapperParts,
-        state: &BundleState,
+        state: BorrowedBundleState<'_>,
     ) -> Result<(), CheckpointError> {
         self.saved = Some(Instant::now());
         let mapper = Box::new(parts(self.instructions.clone(), self.seconds()));

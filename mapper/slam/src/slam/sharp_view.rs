@@ -15,7 +15,7 @@ impl GrowingMap {
         let sensor = &self.sensor;
         let mut renderer = ViewRenderer::new(
             self.simd,
-            &self.bundle.state.map,
+            &self.bundle.map,
             sensor.camera,
             &sensor.inverse_response,
             sensor.depth_scale,

@@ -138,6 +138,7 @@ def track(
     force: bool = False,
     checkpoint_interval: float | None = None,
     threads: int | None = None,
+    simd: str | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Tracks a data set into the RUN folder ``out``.
@@ -162,6 +163,7 @@ def track(
         force=force,
         checkpoint_interval=checkpoint_interval,
         threads=threads,
+        simd=simd,
         progress=progress,
     )
     return Run.open(out)
@@ -184,6 +186,7 @@ def map(  # noqa: A001 -- the command's name; it is called as mba.map
     force: bool = False,
     checkpoint_interval: float | None = None,
     threads: int | None = None,
+    simd: str | None = None,
     progress: Progress | None = None,
 ) -> Run:
     """Makes a sharp map of a data set that was tracked into the run ``trajectory``, in the RUN folder ``out``.
@@ -207,6 +210,7 @@ def map(  # noqa: A001 -- the command's name; it is called as mba.map
         force=force,
         checkpoint_interval=checkpoint_interval,
         threads=threads,
+        simd=simd,
         progress=progress,
     )
     return Run.open(out)
@@ -224,6 +228,7 @@ def slam(
     force: bool = False,
     checkpoint_interval: float | None = None,
     threads: int | None = None,
+    simd: str | None = None,
     progress: Progress | None = None,
     **options: Any,
 ) -> Run:
@@ -240,6 +245,7 @@ def slam(
         force=force,
         checkpoint_interval=checkpoint_interval,
         threads=threads,
+        simd=simd,
         progress=progress,
         **options,
     )

@@ -24,6 +24,13 @@ pub fn open_job(folder: &Path) -> anyhow::Result<Job> {
 /// # Errors
 /// Bad input with advice.
 pub fn inputs(job: &Job, simd: SimdLevel) -> anyhow::Result<(Dataset, Run)> {
+    for (what, folder) in [("run", job.run()), ("data set", job.dataset())] {
+        if !folder.is_dir() {
+            let (folder, job) = (folder.display(), job.folder.display());
+            let message = format!("the {what} {folder} that the job {job} was made of is not there");
+            return Err(bad_input(message, "put it back, or split the run again"));
+        }
+    }
     let run = open::run(&job.run())?;
     let dataset = open::with_estimates(open::dataset(&job.dataset(), simd)?, &run)?;
     Ok((dataset, run))

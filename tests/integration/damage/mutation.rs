@@ -156,7 +156,6 @@ fn flipped(good: &[u8], seed: u32) -> Vec<u8> {
     bytes
 }
 
-/// Index of the first line with a number that is no comment.
 /// A checkpoint with other content and the checksum of that: its header has 64 bytes, of which the last twelve are the
 /// length of what follows and the checksum.
 fn forged(good: &[u8], seed: u32) -> Vec<u8> {
@@ -169,6 +168,7 @@ fn forged(good: &[u8], seed: u32) -> Vec<u8> {
     bytes
 }
 
+/// Index of the first line with a number that is no comment.
 fn first_line_of_data(text: &str) -> usize {
     let is_data = |line: &str| !line.starts_with('#') && line.contains(|c: char| c.is_ascii_digit());
     text.lines().position(is_data).unwrap_or(0)

@@ -69,9 +69,10 @@ pub fn run(args: &Info, simd: SimdLevel, console: &Console) -> anyhow::Result<()
         return Err(bad_input(message, "correct the lists, or restore the images"));
     }
     match missing {
-        Some(missing) => {
-            Err(failed(format!("nothing here can be tracked: {missing}"), "record with light and with depth"))
-        }
+        Some(missing) => Err(failed(
+            format!("nothing here can be tracked: {missing}"),
+            "restore or convert these images, or record again with light and with depth",
+        )),
         None => Ok(()),
     }
 }
